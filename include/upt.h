@@ -930,7 +930,45 @@ typedef struct upt_cut {
    * Volume that the body has lost, mm³.
    */
   float removed_mm3;
+  /**
+   * What the tissue does to the blade of `upt_scene_cut_with`, mN.
+   */
+  float force[3];
+  /**
+   * 0.
+   */
+  uint32_t reserved;
 } upt_cut;
+
+/**
+ * A blade that feels the tissue. All zero: it feels nothing, and cuts whatever way it goes.
+ */
+typedef struct upt_blade {
+  /**
+   * `sizeof(upt_blade)`.
+   */
+  uint32_t struct_size;
+  /**
+   * Fracture energy of the tissue, J/m², which is mN/mm: what new area takes.
+   */
+  float fracture_energy;
+  /**
+   * With how much it must be pushed before a stroke begins to cut, mN, ...
+   */
+  float threshold;
+  /**
+   * ... and is, mN: of the reading of the instrument that is its body, what points against `ahead`.
+   */
+  float pushed;
+  /**
+   * Where the edge is sharp, of any length; zeros: everywhere. It cuts where its way leans from there by less than 60 degrees.
+   */
+  float ahead[3];
+  /**
+   * 0.
+   */
+  uint32_t reserved;
+} upt_blade;
 
 /**
  * The surface of a scene's body, and what of it is new; filled by `upt_scene_update_surface`.
@@ -1711,6 +1749,29 @@ upt_status upt_scene_cut(struct upt_scene *scene,
                          uint64_t pose_count,
                          uint64_t edge_count,
                          struct upt_cut *out);
+
+/**
+ * Cuts as `upt_scene_cut`, by a blade that feels the tissue and that the tissue feels.
+ *
+ * It cuts where it goes where its edge is sharp and, until its stroke has begun to cut, is pushed with the threshold at least. Else nothing changes and
+ * `out->area_mm2` is 0: an instrument that is the blade's body presses meanwhile; leave it out while the blade cuts. What it lays open takes the fracture energy: `out->force` is
+ * `-G dA / ds`, and the next step ends with its reaction on the tissue there. What goes over again what its stroke has laid open feels nothing.
+ *
+ * - `blade`: NULL: `upt_scene_cut`.
+ * - `stroke`, `points`, `pose_count`, `edge_count`, `out`: as there.
+ *
+ * Threads: one at a time.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` as there and for an energy or a threshold below 0,
+ * `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` as there, `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The
+ * scene is then what it was.
+ */
+upt_status upt_scene_cut_with(struct upt_scene *scene,
+                              const struct upt_blade *blade,
+                              uint32_t stroke,
+                              const float *points,
+                              uint64_t pose_count,
+                              uint64_t edge_count,
+                              struct upt_cut *out);
 
 /**
  * Removes what lies inside of an instrument, the deepest first, up to a volume: an aspirator with a rate takes that times the step. Elements go in 64 parts

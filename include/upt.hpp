@@ -542,16 +542,16 @@ public:
   upt_status node_count(std::uint64_t &out) const {
     return check(upt_scene_node_count(handle_, &out));
   }
-  /// Cuts along the way of a blade's edge of edge_points points; poses: [poses,edge_points,3], mm.
-  /// Calls with the same stroke are one blade that goes on.
+  /// Cuts along a blade edge's way; poses: [poses,edge_points,3], mm. One stroke is one blade; one
+  /// with a fracture energy feels the tissue: out.force.
   upt_status cut(std::uint32_t stroke, span<const float> poses, std::size_t edge_points,
-                 upt_cut &out) {
+                 upt_cut &out, const upt_blade &blade = make<upt_blade>()) {
     if (edge_points == 0 || poses.size() % (3 * edge_points) != 0) {
       return detail::mismatch();
     }
     out = make<upt_cut>();
-    return check(upt_scene_cut(handle_, stroke, poses.data(), poses.size() / (3 * edge_points),
-                               edge_points, &out));
+    return check(upt_scene_cut_with(handle_, &blade, stroke, poses.data(),
+                                    poses.size() / (3 * edge_points), edge_points, &out));
   }
   /// Removes what lies inside of an instrument, the deepest first, up to most_mm3.
   upt_status remove(const upt_instrument &instrument, float most_mm3, upt_cut &out) {

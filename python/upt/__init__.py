@@ -81,6 +81,7 @@ def shutdown() -> None:
 __all__ = [
     "ABI_VERSION",
     "ArgumentError",
+    "Blade",
     "BatchedScenes",
     "BundleError",
     "BusyError",

@@ -980,6 +980,10 @@ class Cut(Record):
     """New area of the cut, mm²."""
     removed_mm3: float
     """Volume that the body has lost, mm³."""
+    force: tuple[float, ...] = vector("_force")
+    """What the tissue does to the blade of `upt_scene_cut_with`, mN."""
+    reserved: int
+    """0."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -988,6 +992,34 @@ class Cut(Record):
         ("copied_count", ctypes.c_uint64),
         ("area_mm2", ctypes.c_float),
         ("removed_mm3", ctypes.c_float),
+        ("_force", ctypes.c_float * 3),
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+class Blade(Record):
+    """A blade that feels the tissue. All zero: it feels nothing, and cuts whatever way it goes."""
+
+    struct_size: int
+    """`sizeof(upt_blade)`."""
+    fracture_energy: float
+    """Fracture energy of the tissue, J/m², which is mN/mm: what new area takes."""
+    threshold: float
+    """With how much it must be pushed before a stroke begins to cut, mN, ..."""
+    pushed: float
+    """... and is, mN: of the reading of the instrument that is its body, what points against `ahead`."""
+    ahead: tuple[float, ...] = vector("_ahead")
+    """Where the edge is sharp, of any length; zeros: everywhere. It cuts where its way leans from there by less than 60 degrees."""
+    reserved: int
+    """0."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("fracture_energy", ctypes.c_float),
+        ("threshold", ctypes.c_float),
+        ("pushed", ctypes.c_float),
+        ("_ahead", ctypes.c_float * 3),
+        ("reserved", ctypes.c_uint32),
     ]
 
 
@@ -1054,6 +1086,7 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_hull_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_cut": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_scene_cut_with": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_remove": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_float, ctypes.c_void_p]),
     "upt_scene_scale_stiffness": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_float, ctypes.c_void_p]),
     "upt_scene_drop_fragments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),

@@ -34,6 +34,28 @@ class Surface:
     """Every vertex and triangle is new: the first surface, and the first after another body was put back."""
 
 
+@dataclass(frozen=True, slots=True)
+class Blade:
+    """A blade that feels the tissue that it cuts."""
+
+    fracture_energy: float = 0.0
+    """What new area takes, J/m²."""
+    threshold: float = 0.0
+    """With how much it must be pushed before a stroke begins to cut, mN, ..."""
+    pushed: float = 0.0
+    """... and is, mN."""
+    ahead: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the edge is sharp; zeros: everywhere."""
+
+    def record(self) -> _native.Blade:
+        record = _native.Blade()
+        record.fracture_energy = number(self.fracture_energy, "fracture_energy")
+        record.threshold = number(self.threshold, "threshold")
+        record.pushed = number(self.pushed, "pushed")
+        record.ahead = [number(x, "ahead") for x in self.ahead]
+        return record
+
+
 class Cuts:
     """Operations that change the body of a scene: `Scene` has them. docs/guide/cutting.md tells what they do.
 
@@ -44,12 +66,13 @@ class Cuts:
     _handle: int | None
     _vertex_count: int = 0
 
-    def cut(self, poses: ArrayLike, stroke: int = 0) -> Cut:
+    def cut(self, poses: ArrayLike, stroke: int = 0, blade: Blade | None = None) -> Cut:
         """Cuts along the way of a blade's edge through the tissue as it is now. Nothing moves before the next step.
 
         Args:
             poses: `[poses, points, 3]`, mm: the edge as a line of points, two or more, at two poses or more.
             stroke: calls with the same number are one blade that goes on; another number cuts anew.
+            blade: feels the tissue (`Cut.force`), and is felt; may refuse to cut, with an area of 0.
 
         Raises:
             upt.ArgumentError: the blade sweeps no area, or the body would have more copies than nodes.
@@ -59,7 +82,8 @@ class Cuts:
         if path.ndim != 3 or path.shape[2] != 3:
             raise ValueError(f"poses has shape {path.shape}, expected (poses, points, 3)")
         out = Cut()
-        check(lib.upt_scene_cut(self._handle, stroke, address(path), len(path), path.shape[1], byref(out)))
+        record = None if blade is None else byref(blade.record())
+        check(lib.upt_scene_cut_with(self._handle, record, stroke, address(path), len(path), path.shape[1], byref(out)))
         self._fit()
         return out
 

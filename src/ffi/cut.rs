@@ -4,12 +4,12 @@ use super::constants::*;
 use super::convert;
 use super::failure::{Answer, Failure, fail};
 use super::output::fill;
-use super::pointers::{required, slice};
+use super::pointers::{options, required, slice};
 use super::registry::call_scene;
 use super::step_structs::*;
 use super::structs::*;
 use crate::features;
-use crate::scene::{Cut, Scene};
+use crate::scene::{Blade, Cut, Scene};
 
 /// Points of a sweep, and elements of a list, at most: asked before the host's array is touched.
 const MOST: u64 = 1 << 20;
@@ -42,21 +42,85 @@ pub unsafe extern "C" fn upt_scene_cut(
     out: *mut upt_cut,
 ) -> upt_status {
     call_scene("upt_scene_cut", scene, |scene| {
-        let count = pose_count.saturating_mul(edge_count);
-        if pose_count < 2 || edge_count < 2 || count > MOST {
+        // SAFETY: the host passes that many floats, and a struct whose first field is its size, as the header asks.
+        unsafe {
+            cut_with(
+                scene,
+                &Blade::default(),
+                stroke,
+                (points, pose_count, edge_count),
+                out,
+            )
+        }
+    })
+}
+
+/// Cuts as `upt_scene_cut`, by a blade that feels the tissue and that the tissue feels.
+///
+/// It cuts where it goes where its edge is sharp and, until its stroke has begun to cut, is pushed with the threshold at least. Else nothing changes and
+/// `out->area_mm2` is 0: an instrument that is the blade's body presses meanwhile; leave it out while the blade cuts. What it lays open takes the fracture energy: `out->force` is
+/// `-G dA / ds`, and the next step ends with its reaction on the tissue there. What goes over again what its stroke has laid open feels nothing.
+///
+/// - `blade`: NULL: `upt_scene_cut`.
+/// - `stroke`, `points`, `pose_count`, `edge_count`, `out`: as there.
+///
+/// Threads: one at a time.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` as there and for an energy or a threshold below 0,
+/// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` as there, `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The
+/// scene is then what it was.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_cut_with(
+    scene: *mut upt_scene,
+    blade: *const upt_blade,
+    stroke: u32,
+    points: *const f32,
+    pose_count: u64,
+    edge_count: u64,
+    out: *mut upt_cut,
+) -> upt_status {
+    call_scene("upt_scene_cut_with", scene, |scene| {
+        // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
+        let raw = unsafe { options(blade, "blade") }?;
+        if raw.reserved != 0 {
             return fail(
                 UPT_ERR_ARGUMENT,
-                format!(
-                    "pose_count is {pose_count} and edge_count {edge_count}; each must be 2 or more, and their product at most {MOST}"
-                ),
+                "blade.reserved is not zero; clear the struct before you set its fields",
             );
         }
-        // SAFETY: the host passes that many floats, as the header asks.
-        let points = unsafe { slice(points, 3 * count, "points") }?.as_chunks().0;
-        let make = || Ok(scene.cut(stroke, edge_count as usize, points)?);
-        // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
-        unsafe { report(scene, out, make) }
+        let blade = Blade {
+            energy: f64::from(raw.fracture_energy),
+            threshold_mn: f64::from(raw.threshold),
+            pushed_mn: f64::from(raw.pushed),
+            ahead: raw.ahead.map(f64::from),
+        };
+        // SAFETY: as above.
+        unsafe { cut_with(scene, &blade, stroke, (points, pose_count, edge_count), out) }
     })
+}
+
+/// # Safety
+/// As many floats as the counts say; `out` points to a struct whose first field is its size.
+unsafe fn cut_with(
+    scene: &Scene,
+    blade: &Blade,
+    stroke: u32,
+    (points, pose_count, edge_count): (*const f32, u64, u64),
+    out: *mut upt_cut,
+) -> Answer {
+    let count = pose_count.saturating_mul(edge_count);
+    if pose_count < 2 || edge_count < 2 || count > MOST {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!(
+                "pose_count is {pose_count} and edge_count {edge_count}; each must be 2 or more, and their product at most {MOST}"
+            ),
+        );
+    }
+    // SAFETY: the caller's.
+    let points = unsafe { slice(points, 3 * count, "points") }?.as_chunks().0;
+    let make = || Ok(scene.cut_with(blade, stroke, edge_count as usize, points)?);
+    // SAFETY: the caller's.
+    unsafe { report(scene, out, make) }
 }
 
 /// Removes what lies inside of an instrument, the deepest first, up to a volume: an aspirator with a rate takes that times the step. Elements go in 64 parts
@@ -140,6 +204,8 @@ pub unsafe extern "C" fn upt_scene_drop_fragments(
                 copied_count: 0,
                 area_mm2: 0.0,
                 removed_mm3: volumes.iter().sum(),
+                force: [0.0; 3],
+                reserved: 0,
             })
         };
         // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
@@ -165,6 +231,8 @@ unsafe fn report(
             copied_count: cut.copied.len() as u64,
             area_mm2: cut.area_mm2,
             removed_mm3: cut.removed_mm3,
+            force: cut.force,
+            reserved: 0,
         })
     };
     // SAFETY: the caller's.

@@ -31,6 +31,7 @@ sized!(
     upt_scene_options,
     upt_instrument_reading,
     upt_cut,
+    upt_blade,
     upt_surface,
     upt_haptics_options,
     upt_haptic_pose,

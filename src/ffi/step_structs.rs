@@ -220,6 +220,29 @@ pub struct upt_cut {
     pub area_mm2: f32,
     /// Volume that the body has lost, mm³.
     pub removed_mm3: f32,
+    /// What the tissue does to the blade of `upt_scene_cut_with`, mN.
+    pub force: [f32; 3],
+    /// 0.
+    pub reserved: u32,
+}
+
+/// A blade that feels the tissue. All zero: it feels nothing, and cuts whatever way it goes.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_blade {
+    /// `sizeof(upt_blade)`.
+    pub struct_size: u32,
+    /// Fracture energy of the tissue, J/m², which is mN/mm: what new area takes.
+    pub fracture_energy: f32,
+    /// With how much it must be pushed before a stroke begins to cut, mN, ...
+    pub threshold: f32,
+    /// ... and is, mN: of the reading of the instrument that is its body, what points against `ahead`.
+    pub pushed: f32,
+    /// Where the edge is sharp, of any length; zeros: everywhere. It cuts where its way leans from there by less than 60 degrees.
+    pub ahead: [f32; 3],
+    /// 0.
+    pub reserved: u32,
 }
 
 /// The surface of a scene's body, and what of it is new; filled by `upt_scene_update_surface`.

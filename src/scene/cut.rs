@@ -103,6 +103,9 @@ impl Core {
         // Beside its lists the topology makes many small parts.
         memory::probe(body.most_bytes(), SCENE)?;
         let change = operation(&mut body, &positions)?;
+        if change == Change::default() {
+            return Ok(change);
+        }
         let first = self.mesh.node_count();
         let source = |node: usize| {
             let mut node = node;
@@ -128,6 +131,7 @@ impl Core {
         }
         next.take_motion(self, source)?;
         next.follow_loads(self, source)?;
+        next.take_pushes(&change.pushes)?;
         next.counters = self.counters;
         next.counters.sleeping = false;
         next.counters.quiet = 0;

@@ -3,6 +3,7 @@
 use std::sync::MutexGuard;
 
 use ::contact::Vector;
+pub use topology::Blade;
 use topology::{Change, Sweep};
 
 use super::Scene;
@@ -18,6 +19,8 @@ pub struct Cut {
     pub area_mm2: f32,
     /// Volume that the body has lost, mm³.
     pub removed_mm3: f32,
+    /// What the tissue does to the blade ([`Scene::cut_with`]), mN.
+    pub force: [f32; 3],
     /// Of each new node, whose number is the next after the ones that there were: the node whose place and velocity it took.
     pub copied: Vec<u32>,
     /// Elements of the intact mesh of which something has changed, ascending.
@@ -29,10 +32,20 @@ impl From<Change> for Cut {
         Cut {
             area_mm2: change.area_mm2 as f32,
             removed_mm3: change.removed_mm3 as f32,
+            force: change.force().map(|force| -force as f32),
             copied: change.copied,
             elements: change.elements,
         }
     }
+}
+
+/// The way of an edge of `points` points from pose to pose.
+fn sweep(points: usize, poses: &[[f32; 3]]) -> Result<Sweep> {
+    let wide = |point: &[f32; 3]| point.map(f64::from);
+    let edges: Vec<_> = (poses.chunks(points.max(1)))
+        .map(|edge| edge.iter().map(wide).collect())
+        .collect();
+    Ok(Sweep::new(&edges)?)
 }
 
 impl Scene {
@@ -48,14 +61,28 @@ impl Scene {
     /// [`crate::Error::Argument`] for a blade that sweeps no area, poses of other lengths, and more copies than nodes; [`crate::Error::NonFinite`];
     /// [`crate::Error::Unsupported`] for a scene without corrections. The scene is then what it was.
     pub fn cut(&self, stroke: u32, points: usize, poses: &[[f32; 3]]) -> Result<Cut> {
-        let wide = |point: &[f32; 3]| point.map(f64::from);
-        let edges: Vec<_> = (poses.chunks(points.max(1)))
-            .map(|edge| edge.iter().map(wide).collect())
-            .collect();
-        let sweep = Sweep::new(&edges)?;
+        self.cut_with(&Blade::default(), stroke, points, poses)
+    }
+
+    /// The same by a blade that feels the tissue. It cuts where it goes where its edge is sharp and, until its stroke has begun to cut, is pushed with
+    /// the threshold at least; else nothing changes, and the area is 0: its body, an instrument, presses. New area takes the fracture energy:
+    /// [`Cut::force`] is `-G dA / ds`, and the next step ends with its reaction at the tissue that has been laid open.
+    ///
+    /// # Errors
+    /// As [`Scene::cut`]; [`crate::Error::Argument`] and [`crate::Error::NonFinite`] for the blade's numbers.
+    pub fn cut_with(
+        &self,
+        blade: &Blade,
+        stroke: u32,
+        points: usize,
+        poses: &[[f32; 3]],
+    ) -> Result<Cut> {
+        let sweep = sweep(points, poses)?;
         let _frames = self.hold_frames(true)?;
         let change = self.with(|core, published| {
-            core.change(published, |body, at| body.cut(&sweep, stroke, at))
+            core.change(published, |body, at| {
+                body.cut_with(blade, &sweep, stroke, at)
+            })
         });
         change.map(Cut::from)
     }

@@ -1,6 +1,6 @@
 //! What a scene has for loads: those of the last published state, and of the one being made.
 
-use topology::Body;
+use topology::{Body, Push};
 
 use super::loads::{Acting, Loads, WHAT};
 use super::pressed::Pressed;
@@ -85,17 +85,42 @@ impl LoadState {
         before: &Acting,
         mass: [&[f32]; 2],
         source: impl Fn(usize) -> usize,
-    ) {
+    ) -> Result<()> {
         let own = &mut self.last;
-        for (node, dead) in own.dead.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-            let from = source(node);
-            let part = mass[1][node] / mass[0][from].max(f32::MIN_POSITIVE);
-            *dead = [0, 1, 2].map(|axis| part * before.dead[3 * from + axis]);
+        let spread = |from: &[f32], to: &mut [f32]| {
+            for (node, to) in to.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+                let at = source(node);
+                let part = mass[1][node] / mass[0][at].max(f32::MIN_POSITIVE);
+                *to = [0, 1, 2].map(|axis| part * from[3 * at + axis]);
+            }
+        };
+        spread(&before.dead, &mut own.dead);
+        if !before.pushed.is_empty() {
+            own.pushed = memory::zeros(own.dead.len(), WHAT)?;
+            spread(&before.pushed, &mut own.pushed);
         }
         own.pascal.copy_from_slice(&before.pascal);
         own.gravity = before.gravity;
         own.acts = before.acts;
         own.carried = before.carried;
+        Ok(())
+    }
+
+    /// Takes what a blade has done to the tissue since the last step.
+    pub(super) fn push(&mut self, pushes: &[Push]) -> Result<()> {
+        let pushed = &mut self.last.pushed;
+        if pushed.is_empty() {
+            *pushed = memory::zeros(self.last.dead.len(), WHAT)?;
+        }
+        for push in pushes {
+            for (node, weight) in push.nodes.into_iter().zip(push.weights) {
+                let own = &mut pushed[3 * node as usize..][..3];
+                for (own, force) in own.iter_mut().zip(push.force) {
+                    *own += (1e3 * weight * force) as f32;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Takes the loads at the end of a step of `step_s` of a body of these masses, g, which is displaced by `u [K,3]` and moves at `v` (mm/s) at its start.
@@ -117,7 +142,11 @@ impl LoadState {
         next.carried = carried.map(|(carried, _)| carried);
         let carriage = carried.map(|(_, carriage)| carriage);
         let acceleration = loads.acceleration(carriage.as_ref());
-        next.acts = loads.acts_with(acceleration) || carriage.is_some_and(|own| own.acts());
+        next.pushed.clear();
+        let pushed = &self.last.pushed;
+        next.acts = loads.acts_with(acceleration)
+            || carriage.is_some_and(|own| own.acts())
+            || !pushed.is_empty();
         let acceleration = acceleration.map(|a| 1e3 * a);
         next.gravity = acceleration;
         let carriage = carriage.filter(Carriage::acts);
@@ -137,7 +166,8 @@ impl LoadState {
             let (from, part) = (parent(node), takes.get(node).copied().unwrap_or(1.0));
             for axis in 0..3 {
                 let own = (loads.forces).map_or(0.0, |forces| part * forces[3 * from + axis]);
-                dead[axis] = mass * (acceleration[axis] + borne[axis]) + 1e3 * own;
+                let push = pushed.get(3 * node + axis).copied().unwrap_or(0.0);
+                dead[axis] = mass * (acceleration[axis] + borne[axis]) + 1e3 * own + push;
             }
         }
         next.pascal.fill(0.0);

@@ -2,6 +2,8 @@
 
 use std::sync::RwLock;
 
+use topology::Push;
+
 use super::core::{Core, lock_read};
 use super::load_state::LoadState;
 use super::loads::{Acting, Loads, WHAT};
@@ -95,7 +97,21 @@ impl Core {
         let mut state = self.blank_loads()?;
         let mass = [&before.model, &self.model].map(|model| model.corrections());
         let [then, now] = mass;
-        state.follow(&old.last, [&then?.body.mass, &now?.body.mass], source);
+        state.follow(&old.last, [&then?.body.mass, &now?.body.mass], source)?;
+        self.loads = Some(state);
+        Ok(())
+    }
+
+    /// The next step ends with what a blade has done to the tissue.
+    pub(super) fn take_pushes(&mut self, pushes: &[Push]) -> Result<()> {
+        if pushes.is_empty() {
+            return Ok(());
+        }
+        let mut state = match self.loads.take() {
+            Some(state) => state,
+            None => self.blank_loads()?,
+        };
+        state.push(pushes)?;
         self.loads = Some(state);
         Ok(())
     }
@@ -141,6 +157,6 @@ impl Core {
 
     /// Bytes of saved loads at most.
     pub(super) fn load_bytes(&self) -> usize {
-        4 * (self.mesh.positions.len() + self.mesh.surface_faces.len()) + 128
+        4 * (2 * self.mesh.positions.len() + self.mesh.surface_faces.len()) + 128
     }
 }

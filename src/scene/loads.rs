@@ -149,6 +149,9 @@ pub struct Acting {
     /// Pressure by boundary triangle of the intact mesh `[F]`, and behind it that on walls, Pa.
     #[serde(with = "stored")]
     pub(super) pascal: Vec<f32>,
+    /// What a blade has done to the tissue since `[K,3]`, µN: the next step ends with it. Empty for nothing.
+    #[serde(with = "stored")]
+    pub(super) pushed: Vec<f32>,
     /// Whether any of it is not zero.
     pub(super) acts: bool,
     /// The support, where the host gives one.
@@ -161,6 +164,7 @@ impl Acting {
             dead: memory::zeros(mesh.positions.len(), WHAT)?,
             gravity: [0.0; 3],
             pascal: memory::zeros(mesh.surface_faces.len() / 3 + 1, WHAT)?,
+            pushed: Vec::new(),
             acts: false,
             carried: None,
         })
@@ -170,19 +174,21 @@ impl Acting {
         self.dead.fill(0.0);
         self.gravity = [0.0; 3];
         self.pascal.fill(0.0);
+        self.pushed.clear();
         self.acts = false;
         self.carried = None;
     }
 
     /// A copy, where anything acts.
     pub(super) fn copy(&self) -> Result<Option<Acting>> {
-        if !self.acts && self.carried.is_none() {
+        if !self.acts && self.carried.is_none() && self.pushed.is_empty() {
             return Ok(None);
         }
         Ok(Some(Acting {
             dead: memory::copied(&self.dead, WHAT)?,
             gravity: self.gravity,
             pascal: memory::copied(&self.pascal, WHAT)?,
+            pushed: memory::copied(&self.pushed, WHAT)?,
             acts: self.acts,
             carried: self.carried,
         }))
@@ -192,6 +198,9 @@ impl Acting {
     pub(super) fn admit(&self, mesh: &Mesh) -> Result<()> {
         stored::check(&self.dead, mesh.positions.len())?;
         stored::check(&self.gravity, 3)?;
+        if !self.pushed.is_empty() {
+            stored::check(&self.pushed, mesh.positions.len())?;
+        }
         if self.carried.is_some_and(|carried| !carried.is_sound()) {
             return Err(Error::Snapshot("the support's motion is damaged".into()));
         }

@@ -32,6 +32,21 @@ impl World<'_> {
                         upt_scene_cut(scene, stroke, points, poses, edge, place),
                     )
                 }
+                Function::CutWith => {
+                    let mut points: Vec<f32> = (0..12)
+                        .map(|_| random.next(300) as f32 / 10.0 - 5.0)
+                        .collect();
+                    spoil(&mut points, call.odd, call.seed as usize % 12);
+                    let mut blade: [upt_blade; 1] = [std::mem::zeroed()];
+                    blade[0].struct_size = sized::<upt_blade>(call);
+                    blade[0].fracture_energy = random.next(90) as f32 - 5.0;
+                    blade[0].pushed = if call.odd == Odd::NaN { f32::NAN } else { 9.0 };
+                    blade[0].ahead = [0.0, random.next(3) as f32 - 1.0, 0.0];
+                    let blade = pointer(&blade, call, 0);
+                    let points = pointer(&points, call, 2);
+                    let status = upt_scene_cut_with(scene, blade, 7, points, 2, 2, place);
+                    ("upt_scene_cut_with", status)
+                }
                 Function::Remove => {
                     let one = Call {
                         seed: call.seed % 1000 * 3 + 1,

@@ -200,7 +200,7 @@ impl<'a> World<'a> {
             Instruments | Readings | InstrumentContacts | HullCreate | HullDestroy => {
                 self.call_instruments(call, scene, nodes)
             }
-            Cut | Remove | ScaleStiffness | DropFragments => self.call_cuts(call, scene),
+            Cut | CutWith | Remove | ScaleStiffness | DropFragments => self.call_cuts(call, scene),
             NodeCount | UpdateSurface | Surface | SurfacePositions => {
                 self.call_surface(call, scene)
             }

@@ -7,14 +7,14 @@ use tissue::solver::{ContactNode, Loads as TrueLoads, Solver, SolverOptions, Sur
 use upt::{Error, Loads, Pressure, StepInput};
 
 /// A scene of the liver and the reference solver of the same body.
-struct Both {
-    scene: Scene,
-    truth: Solver,
-    mesh: Mesh,
+pub(super) struct Both {
+    pub scene: Scene,
+    pub truth: Solver,
+    pub mesh: Mesh,
 }
 
 impl Both {
-    fn new() -> Both {
+    pub fn new() -> Both {
         let model = liver();
         let path = std::path::Path::new("onnx/liver-coarse/mesh.safetensors");
         let mesh = Mesh::read(path).unwrap();
@@ -38,7 +38,12 @@ impl Both {
     }
 
     /// A step of both; mean squared distance of the mesh's nodes, mm², the farthest displacement of the truth, mm, and its reaction.
-    fn step(&mut self, input: StepInput<'_>, loads: &TrueLoads, contact: &[ContactNode]) -> Found {
+    pub fn step(
+        &mut self,
+        input: StepInput<'_>,
+        loads: &TrueLoads,
+        contact: &[ContactNode],
+    ) -> Found {
         self.truth.set_loads(loads).unwrap();
         let report = self.truth.step_frame(contact, 0.05).unwrap();
         let mut wanted = vec![[0.0; 3]; self.truth.node_count()];
@@ -58,11 +63,11 @@ impl Both {
     }
 }
 
-struct Found {
-    square: f64,
-    farthest: f32,
-    pull: Vector,
-    u: Vec<f32>,
+pub(super) struct Found {
+    pub square: f64,
+    pub farthest: f32,
+    pub pull: Vector,
+    pub u: Vec<f32>,
 }
 
 /// Gravity that turns, a force on each of some nodes and pressure on the surface and in the slit, while the blade comes.

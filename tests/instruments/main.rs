@@ -1,6 +1,7 @@
 //! Steps that rigid instruments drive: what the contact obeys, in every state that a host can bring about, and what is refused.
 #![cfg(feature = "instruments")]
 
+mod cut_blade;
 mod cut_loads;
 mod cut_operations;
 mod cut_scenes;

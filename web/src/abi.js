@@ -316,7 +316,7 @@ export const upt_instrument_contact = {
   },
 };
 export const upt_cut = {
-  size: 32,
+  size: 48,
   fields: {
     struct_size: ["Uint32", 0, 1],
     fragment_count: ["Uint32", 4, 1],
@@ -324,6 +324,19 @@ export const upt_cut = {
     copied_count: ["BigUint64", 16, 1],
     area_mm2: ["Float32", 24, 1],
     removed_mm3: ["Float32", 28, 1],
+    force: ["Float32", 32, 3],
+    reserved: ["Uint32", 44, 1],
+  },
+};
+export const upt_blade = {
+  size: 32,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    fracture_energy: ["Float32", 4, 1],
+    threshold: ["Float32", 8, 1],
+    pushed: ["Float32", 12, 1],
+    ahead: ["Float32", 16, 3],
+    reserved: ["Uint32", 28, 1],
   },
 };
 export const upt_surface = {

@@ -61,6 +61,7 @@ structs!(
     upt_instrument_reading,
     upt_instrument_contact,
     upt_cut,
+    upt_blade,
     upt_surface
 );
 

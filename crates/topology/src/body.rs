@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 use serde::{Deserialize, Serialize};
 
 use crate::polytope::{Polytope, Weights};
+use crate::push::Push;
 use crate::{Point, RestMesh, TopologyError};
 
 /// Part of an element, with nodes of its own.
@@ -78,6 +79,8 @@ pub struct Change {
     pub elements: Vec<u32>,
     /// New area of a cut, mm².
     pub area_mm2: f64,
+    /// What a blade with a fracture energy does to the tissue; none of one without.
+    pub pushes: Vec<Push>,
     /// Volume that the body has lost, mm³.
     pub removed_mm3: f64,
 }
@@ -92,6 +95,8 @@ pub struct Body {
     pub(crate) parents: Vec<u32>,
     /// Of each stroke: distances from the blade at the nodes that it passed, fixed once used.
     pub(crate) strokes: BTreeMap<u32, BTreeMap<u32, f64>>,
+    /// Of each stroke: the area that it has laid open in each element that it has met, mm².
+    pub(crate) opened: BTreeMap<u32, BTreeMap<u32, f64>>,
     /// Factors of stiffness other than 1.
     pub(crate) stiffness: BTreeMap<u32, f32>,
     /// Nodes at most.
@@ -106,6 +111,7 @@ impl Body {
             cells: BTreeMap::new(),
             parents: Vec::new(),
             strokes: BTreeMap::new(),
+            opened: BTreeMap::new(),
             stiffness: BTreeMap::new(),
             most_nodes: u32::MAX as usize,
         }
@@ -174,7 +180,8 @@ impl Body {
         let cells: usize = cells
             .map(|cell| size_of::<Cell>() + 40 * corners(cell))
             .sum();
-        let distances: usize = self.strokes.values().map(|own| 16 * own.len()).sum();
+        let strokes = self.strokes.values().chain(self.opened.values());
+        let distances: usize = strokes.map(|own| 16 * own.len()).sum();
         self.mesh.heap_bytes() + cells + distances + 4 * self.parents.len()
     }
 

@@ -3,10 +3,14 @@
 //! Of each stroke a node has one signed distance from the blade, linear in each element, fixed once used: so neighbours see the same
 //! line on their common face, whatever the blade's form.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::blade::Blade;
 use crate::body::{Body, Cell, Change, place};
+use crate::polygon::middle;
 use crate::polytope::{Polytope, Side, Weights};
+use crate::push::Opened;
 use crate::rest::{length, minus};
 use crate::room::push;
 use crate::{Point, Sweep, TopologyError};
@@ -30,32 +34,37 @@ impl Body {
         stroke: u32,
         positions: &[Point],
     ) -> Result<Change, TopologyError> {
-        self.check(positions)?;
-        let mut next = self.clone();
-        let change = next.cut_in_place(sweep, stroke, positions)?;
-        *self = next;
-        Ok(change)
+        self.cut_with(&Blade::default(), sweep, stroke, positions)
     }
 
-    fn cut_in_place(
+    pub(crate) fn cut_in_place(
         &mut self,
         sweep: &Sweep,
         stroke: u32,
         positions: &[Point],
+        parts: &mut Vec<Opened>,
     ) -> Result<Change, TopologyError> {
+        let mut opened = self.opened.remove(&stroke).unwrap_or_default();
         let mut distances = self.strokes.remove(&stroke).unwrap_or_default();
         let mut change = Change::default();
         let mut fixed = Vec::new();
-        for element in self.near(sweep, positions)? {
+        let near = self.near(sweep, positions)?;
+        let turned = self.is_turned(sweep, positions, &near, &distances);
+        let sign = if turned { -1.0 } else { 1.0 };
+        for element in near {
             let mut cells = self.cells(element).into_owned();
             let mut parted = Vec::with_capacity(2 * cells.len());
             let mut is_touched = false;
+            // What a blade goes over again is not new once all of its cut through the element is open, and many small pieces of a way touch as one
+            // long one does.
+            let before = opened.get(&element).copied().unwrap_or(0.0);
+            let mut all = 0.0;
             for cell in cells.drain(..) {
                 let corners = cell.nodes.map(|node| positions[node as usize]);
                 let distance: Weights = std::array::from_fn(|corner| {
                     let node = cell.nodes[corner];
                     (distances.get(&node).copied())
-                        .unwrap_or_else(|| self.distance(sweep, node, corners[corner]))
+                        .unwrap_or_else(|| sign * self.distance(sweep, node, corners[corner]))
                 });
                 let edge = longest(&corners);
                 let met = match cell.is_alive {
@@ -69,12 +78,25 @@ impl Body {
                 let points: Vec<Point> = (met.cut.iter()).map(|at| place(at, &corners)).collect();
                 let area = sweep.overlap(&points, edge);
                 let whole = length(crate::polygon::normal(&points));
-                if area <= TOUCHED * whole {
+                // Both sides have the cut; it is counted once.
+                if met.counts && area > 0.0 {
+                    all += whole;
+                    let entry = opened.entry(element).or_default();
+                    let new = area.min(all - *entry).max(0.0);
+                    *entry += new;
+                    change.area_mm2 += new;
+                    let at = middle(&met.cut);
+                    let part = Opened {
+                        element,
+                        at,
+                        area_mm2: new,
+                    };
+                    push(parts, part)?;
+                }
+                if area <= 0.0 || before + area <= TOUCHED * whole {
                     parted.push(cell);
                     continue;
                 }
-                // Both sides have the cut; it is counted once.
-                change.area_mm2 += if met.counts { area } else { 0.0 };
                 for pair in cell.nodes.into_iter().zip(distance) {
                     push(&mut fixed, pair)?;
                 }
@@ -92,6 +114,7 @@ impl Body {
         }
         distances.extend(fixed);
         self.strokes.insert(stroke, distances);
+        self.opened.insert(stroke, opened);
         self.part_nodes(&mut change)?;
         Ok(change)
     }
@@ -132,6 +155,25 @@ impl Body {
             }
         }
         Ok(near)
+    }
+
+    /// Whether a sweep has its positive side where the stroke before it had the negative one, as one that goes back does.
+    fn is_turned(
+        &self,
+        sweep: &Sweep,
+        positions: &[Point],
+        near: &[u32],
+        distances: &BTreeMap<u32, f64>,
+    ) -> bool {
+        let mut sum = 0.0;
+        for element in near {
+            for node in self.cells(*element).iter().flat_map(|cell| cell.nodes) {
+                if let Some(own) = distances.get(&node).filter(|own| **own != 0.0) {
+                    sum += own * self.distance(sweep, node, positions[node as usize]);
+                }
+            }
+        }
+        sum < 0.0
     }
 
     /// Of a node from the blade: 0 where it is near.

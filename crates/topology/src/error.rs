@@ -14,6 +14,11 @@ pub enum TopologyError {
         "the blade sweeps no area: give at least two poses of an edge of at least two points, with the edge moved across itself"
     )]
     NoArea,
+    /// A blade that no tissue meets.
+    #[error(
+        "a blade with a fracture energy of {energy} J/m² and a threshold of {threshold_mn} mN; both must be 0 or more"
+    )]
+    Blade { energy: f64, threshold_mn: f64 },
     /// Edges of another number of points.
     #[error(
         "blade[{index}] has {found} points, the edge before it {expected}: each pose is of the same edge"

@@ -14,6 +14,7 @@ pub struct Kept {
     cells: BTreeMap<u32, Vec<Cell>>,
     parents: Vec<u32>,
     strokes: BTreeMap<u32, BTreeMap<u32, f64>>,
+    opened: BTreeMap<u32, BTreeMap<u32, f64>>,
     stiffness: BTreeMap<u32, f32>,
 }
 
@@ -24,6 +25,7 @@ impl Body {
             cells: self.cells.clone(),
             parents: self.parents.clone(),
             strokes: self.strokes.clone(),
+            opened: self.opened.clone(),
             stiffness: self.stiffness.clone(),
         }
     }
@@ -64,13 +66,16 @@ impl Body {
                 .stiffness
                 .values()
                 .all(|factor| (1e-3..=1e3).contains(factor))
-            && (kept.strokes.values().flatten()).all(|(node, d)| is_node(node) && d.is_finite());
+            && (kept.strokes.values().flatten()).all(|(node, d)| is_node(node) && d.is_finite())
+            && (kept.opened.values().flatten())
+                .all(|(element, area)| is_element(element) && area.is_finite() && *area >= 0.0);
         if !fine {
             return Err(TopologyError::Kept);
         }
         body.cells = kept.cells;
         body.parents = kept.parents;
         body.strokes = kept.strokes;
+        body.opened = kept.opened;
         body.stiffness = kept.stiffness;
         Ok(body)
     }

@@ -13,11 +13,13 @@
 //! | [`connect`] | which cells are joined, and where nodes part |
 //! | [`elements`] | what a solver takes: nodes, shares and stiffness of each cell |
 //! | [`surface`] | the closed surface, inside faces included; what outside pressure acts on |
+//! | [`blade`] | what a blade feels |
 //! | `carry` | which nodes take what acts on a node of the mesh |
 //! | `touchable` | faces that tools may touch |
 //!
 //! Lengths are millimetres. Nothing here knows an element law or a time.
 
+pub mod blade;
 pub mod body;
 mod carry;
 pub mod connect;
@@ -28,6 +30,7 @@ mod fragments;
 mod kept;
 pub mod polygon;
 pub mod polytope;
+mod push;
 mod remove;
 pub mod rest;
 mod room;
@@ -35,11 +38,13 @@ pub mod surface;
 pub mod sweep;
 mod touchable;
 
+pub use blade::Blade;
 pub use body::{Body, Cell, Change};
 pub use elements::{Changes, Element};
 pub use error::TopologyError;
 pub use fragments::Fragment;
 pub use kept::Kept;
+pub use push::Push;
 pub use rest::RestMesh;
 pub use surface::{Skin, SkinTriangle, Surface, SurfaceChange, Vertex};
 pub use sweep::Sweep;

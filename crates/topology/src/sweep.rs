@@ -14,6 +14,7 @@ const NEAR: f64 = 0.35;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
     triangles: Vec<[Point; 3]>,
+    way: Point,
 }
 
 impl Sweep {
@@ -50,8 +51,16 @@ impl Sweep {
         }
         match triangles.is_empty() {
             true => Err(TopologyError::NoArea),
-            false => Ok(Sweep { triangles }),
+            false => Ok(Sweep {
+                triangles,
+                way: way(&poses[0], &poses[poses.len() - 1]),
+            }),
         }
+    }
+
+    /// How far the edge goes from its first pose to its last, in the mean of its points, mm.
+    pub fn way(&self) -> Point {
+        self.way
     }
 
     /// The triangles.
@@ -110,6 +119,11 @@ impl Sweep {
         }
         sum
     }
+}
+
+fn way(from: &[Point], to: &[Point]) -> Point {
+    let [a, b] = [from, to].map(polygon::middle);
+    minus(b, a)
 }
 
 fn area([a, b, c]: [Point; 3]) -> f64 {

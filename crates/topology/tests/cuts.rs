@@ -5,7 +5,7 @@ mod block;
 use std::sync::Arc;
 
 use block::{Draw, block, open_edges, rest};
-use topology::{Body, Point, Surface, Sweep, TopologyError};
+use topology::{Blade, Body, Change, Point, Surface, Sweep, TopologyError};
 
 /// A blade's edge of two points at two poses: the plane `x = at` from `z` upward, `y` from `y[0]` to `y[1]`.
 fn plane(at: f64, y: [f64; 2], z: f64, top: f64) -> Sweep {
@@ -305,4 +305,90 @@ fn ten_thousand_operations_break_nothing() {
         assert_eq!(again.kept(), body.kept());
     }
     assert_eq!((refused, open), (0, 0));
+}
+
+/// The work of the blade is the fracture energy of what it has laid open, by whatever steps; on its way back it feels nothing.
+#[test]
+fn the_work_of_a_blade_is_the_energy_of_its_area() {
+    let mesh = block([6, 4, 3], 5.0, 0.25);
+    for step in [5.0, 1.0, 0.05] {
+        let mut body = Body::new(Arc::clone(&mesh));
+        let blade = Blade {
+            energy: 40.0,
+            threshold_mn: 90.0,
+            pushed_mn: 100.0,
+            ahead: [0.0, 2.0, 0.0],
+        };
+        let edge = |y: f64| vec![[13.7, y, 20.0], [13.7, y, 6.0]];
+        // Pushed too little, aside or flat it does not begin.
+        let first = Sweep::new(&[edge(-1.0), edge(1.0)]).unwrap();
+        let weak = Blade {
+            pushed_mn: 80.0,
+            ..blade
+        };
+        let flat = Blade {
+            ahead: [1.0, 0.2, 0.0],
+            ..blade
+        };
+        let at = rest(&body);
+        for idle in [weak, flat] {
+            let change = body.cut_with(&idle, &first, 0, &at).unwrap();
+            assert_eq!(change, Change::default());
+        }
+        assert!(body.is_intact());
+        let bad = Blade {
+            energy: -1.0,
+            ..blade
+        };
+        assert!(body.cut_with(&bad, &first, 0, &at).is_err());
+        let (mut work, mut area, mut largest) = (0.0, 0.0, 0.0f64);
+        let mut y = -1.0;
+        while y < 21.0 {
+            let sweep = Sweep::new(&[edge(y), edge(y + step)]).unwrap();
+            // Once in the tissue it needs no threshold.
+            let own = Blade {
+                pushed_mn: if y > 2.0 { 0.0 } else { 100.0 },
+                ..blade
+            };
+            let at = rest(&body);
+            let change = body.cut_with(&own, &sweep, 0, &at).unwrap();
+            let force = change.force();
+            work += force[1] * step;
+            area += change.area_mm2;
+            assert!(force[0].abs() < 1e-9 && force[2].abs() < 1e-9);
+            for push in &change.pushes {
+                assert!((push.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+                assert!(
+                    push.nodes
+                        .iter()
+                        .all(|node| (*node as usize) < body.node_count())
+                );
+            }
+            // In the middle of the block, where the edge is 9 mm deep: 40 mN/mm.
+            if (5.0..15.0).contains(&y) {
+                largest = largest.max(force[1]);
+            }
+            y += step;
+        }
+        let wanted = 20.0 * 9.0;
+        assert!((work - 40.0 * area).abs() < 1e-6 * work, "{step}: {work}");
+        assert!((area - wanted).abs() < 0.05 * wanted, "{step}: {area} mm²");
+        println!(
+            "{step}: area {area} of {wanted}, force at most {largest} of {}",
+            40.0 * 9.0
+        );
+        assert!(largest < 1.3 * 40.0 * 9.0, "{step}: {largest}");
+        // What it goes over again takes no more than the elements at its end had left.
+        let any = Blade {
+            ahead: [0.0; 3],
+            ..blade
+        };
+        for most in [0.15, 0.001] {
+            let back = Sweep::new(&[edge(20.0), edge(0.0)]).unwrap();
+            let at = rest(&body);
+            let again = body.cut_with(&any, &back, 0, &at).unwrap();
+            assert!(again.area_mm2 <= most * wanted, "{step}: {again:?}");
+            assert!(again.elements.is_empty(), "{step}: {again:?}");
+        }
+    }
 }

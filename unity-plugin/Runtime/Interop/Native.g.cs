@@ -467,6 +467,28 @@ namespace Upt.Interop
         public float area_mm2;
         /// <summary>Volume that the body has lost, mm³.</summary>
         public float removed_mm3;
+        /// <summary>What the tissue does to the blade of `upt_scene_cut_with`, mN.</summary>
+        public fixed float force[3];
+        /// <summary>0.</summary>
+        public uint reserved;
+    }
+
+    /// <summary>A blade that feels the tissue. All zero: it feels nothing, and cuts whatever way it goes.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_blade
+    {
+        /// <summary>`sizeof(upt_blade)`.</summary>
+        public uint struct_size;
+        /// <summary>Fracture energy of the tissue, J/m², which is mN/mm: what new area takes.</summary>
+        public float fracture_energy;
+        /// <summary>With how much it must be pushed before a stroke begins to cut, mN, ...</summary>
+        public float threshold;
+        /// <summary>... and is, mN: of the reading of the instrument that is its body, what points against `ahead`.</summary>
+        public float pushed;
+        /// <summary>Where the edge is sharp, of any length; zeros: everywhere. It cuts where its way leans from there by less than 60 degrees.</summary>
+        public fixed float ahead[3];
+        /// <summary>0.</summary>
+        public uint reserved;
     }
 
     /// <summary>The surface of a scene's body, and what of it is new; filled by `upt_scene_update_surface`.</summary>
@@ -1088,6 +1110,24 @@ namespace Upt.Interop
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_scene_cut(IntPtr scene, uint stroke, float* points, ulong pose_count, ulong edge_count, upt_cut* @out);
+
+        /// <summary>
+        /// Cuts as `upt_scene_cut`, by a blade that feels the tissue and that the tissue feels.
+        ///
+        /// It cuts where it goes where its edge is sharp and, until its stroke has begun to cut, is pushed with the threshold at least. Else nothing changes and
+        /// `out-&gt;area_mm2` is 0: an instrument that is the blade's body presses meanwhile; leave it out while the blade cuts. What it lays open takes the fracture energy: `out-&gt;force` is
+        /// `-G dA / ds`, and the next step ends with its reaction on the tissue there. What goes over again what its stroke has laid open feels nothing.
+        ///
+        /// - `blade`: NULL: `upt_scene_cut`.
+        /// - `stroke`, `points`, `pose_count`, `edge_count`, `out`: as there.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` as there and for an energy or a threshold below 0,
+        /// `UPT_ERR_NON_FINITE`, `UPT_ERR_UNSUPPORTED` as there, `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The
+        /// scene is then what it was.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_cut_with(IntPtr scene, upt_blade* blade, uint stroke, float* points, ulong pose_count, ulong edge_count, upt_cut* @out);
 
         /// <summary>
         /// Removes what lies inside of an instrument, the deepest first, up to a volume: an aspirator with a rate takes that times the step. Elements go in 64 parts

@@ -6,6 +6,7 @@
 use super::fields::Node;
 use super::support::Support;
 use elements::vector::{cross, subtract};
+use topology::Push;
 
 /// Loads at the end of a frame. By default there are none.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,6 +55,8 @@ pub(super) struct BodyLoad {
     pub faces: Vec<Face>,
     /// The loads at its start and its end, as they were set.
     pub set: [Loads; 2],
+    /// What a blade does to the tissue at its start and its end.
+    pub pushed: [Vec<Push>; 2],
     /// Inner steps of the frame.
     pub steps: u32,
     /// The support, where it moves.
@@ -117,8 +120,8 @@ impl BodyLoad {
         }
     }
 
-    /// The end of the frame becomes the start of the next.
-    pub fn arrive(&mut self) {
+    /// The end of the frame becomes the start of the next; says whether a blade pushed that does so no more.
+    pub fn arrive(&mut self) -> bool {
         let [from, to] = &mut self.dead;
         from.copy_from_slice(to);
         for face in &mut self.faces {
@@ -129,6 +132,9 @@ impl BodyLoad {
         if let Some(support) = &mut self.support {
             support.arrive();
         }
+        self.pushed.swap(0, 1);
+        self.pushed[1].clear();
+        !self.pushed[0].is_empty()
     }
 }
 

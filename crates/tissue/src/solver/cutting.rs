@@ -9,7 +9,7 @@ use super::{Solver, SolverError};
 use contact::{SPACING_MM, Samples};
 use elements::{PADDING, Tetrahedra};
 use std::sync::Arc;
-use topology::{Body, Change, Fragment, Point, RestMesh, Sweep, TopologyError};
+use topology::{Blade, Body, Change, Fragment, Point, RestMesh, Sweep, TopologyError};
 
 impl Solver {
     /// A blade's edge passes a sweep, in the tissue as it is now: see [`Body::cut`].
@@ -19,6 +19,23 @@ impl Solver {
     pub fn cut(&mut self, sweep: &Sweep, stroke: u32) -> Result<Change, SolverError> {
         let places = self.places();
         self.change(|body| body.cut(sweep, stroke, &places))
+    }
+
+    /// The same by a blade that feels the tissue: see [`Body::cut_with`]. What it does to the tissue acts at the end of the next frame, on a line from
+    /// the one before.
+    ///
+    /// # Errors
+    /// As there; the body and its motion are then as before.
+    pub fn cut_with(
+        &mut self,
+        blade: &Blade,
+        sweep: &Sweep,
+        stroke: u32,
+    ) -> Result<Change, SolverError> {
+        let places = self.places();
+        let change = self.change(|body| body.cut_with(blade, sweep, stroke, &places))?;
+        self.push(&change.pushes)?;
+        Ok(change)
     }
 
     /// Removes what lies where `depth` is positive, up to a volume: see [`Body::remove`].

@@ -7,6 +7,7 @@ use super::support::{Support, SupportMotion};
 use super::{Solver, SolverError};
 use crate::mesh::tet_volume;
 use std::collections::BTreeMap;
+use topology::Push;
 use topology::rest::FACES;
 
 impl Solver {
@@ -29,21 +30,34 @@ impl Solver {
         let Some(load) = self.load.take() else {
             return Ok(());
         };
-        let [start, end] = load.set;
+        let ([start, end], [pushed, push]) = (load.set, load.pushed);
         let slots = self.partition.node_of_slot.len();
         let mut next = BodyLoad::with_slots(slots);
         next.set[1] = start;
+        next.pushed[1] = pushed;
         self.load = Some(next);
         self.place_loads()?;
         if let Some(load) = &mut self.load {
             load.arrive();
             load.set[1] = end;
+            load.pushed[1] = push;
         }
         self.place_loads()
     }
 
+    /// A blade does this to the tissue at the end of the next frame, too.
+    pub(super) fn push(&mut self, pushes: &[Push]) -> Result<(), SolverError> {
+        if pushes.is_empty() {
+            return Ok(());
+        }
+        let slots = self.partition.node_of_slot.len();
+        let load = self.load.get_or_insert_with(|| BodyLoad::with_slots(slots));
+        load.pushed[1].extend_from_slice(pushes);
+        self.place_loads()
+    }
+
     /// Puts the loads at the end of the frame where the inner steps find them; those at its start are there.
-    fn place_loads(&mut self) -> Result<(), SolverError> {
+    pub(super) fn place_loads(&mut self) -> Result<(), SolverError> {
         let mass = self.mass_of_nodes();
         let Some(load) = &mut self.load else {
             return Ok(());
@@ -71,6 +85,11 @@ impl Solver {
             }
             for (node, part) in &parts {
                 add(*node as usize, force.map(|f| 1e3 * part * f64::from(f)));
+            }
+        }
+        for push in &load.pushed[1] {
+            for (node, weight) in push.nodes.into_iter().zip(push.weights) {
+                add(node as usize, push.force.map(|f| 1e3 * weight * f));
             }
         }
         let [before, now] = [0, 1].map(|end: usize| {

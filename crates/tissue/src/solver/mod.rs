@@ -264,8 +264,8 @@ impl Solver {
                 Ok(work) => {
                     self.time_s += duration_s;
                     self.external_work += work;
-                    if let Some(load) = &mut self.load {
-                        load.arrive();
+                    if self.load.as_mut().is_some_and(BodyLoad::arrive) {
+                        self.place_loads()?;
                     }
                     if let Some(ties) = &mut self.ties {
                         ties.arrive();
