@@ -1,4 +1,4 @@
-//! Whole steps: the table of `docs/results/performance.md`.
+//! Whole steps: the table of `docs/results/speed.md`.
 //!
 //! `cargo bench --bench step` runs every bundle in `onnx/` and in the folder that `UPT_BENCH_BUNDLES` names. A bundle that
 //! carries `paper_encoder.onnx` and `paper_decoder.onnx` is also run through ONNX Runtime as the paper splits it, with

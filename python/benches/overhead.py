@@ -1,6 +1,6 @@
 """What Python adds to a step: one loop in C and in Python, by turns on one scene.
 
-    python python/benches/overhead.py --markdown docs/results/performance.md
+    python python/benches/overhead.py --markdown PAGE
 
 A step by nodes in contact, and one by an instrument beside the tissue. A turn is a row of steps from rest in C and the
 same row in Python, each call timed by itself. A call's time is the median of all turns, what Python adds to it the

@@ -4,7 +4,7 @@ By the clock it is true only where nothing else runs; processor time says what t
 threads as cores that step their scenes without waiting for one another say what the machine gives: cores share caches,
 memory and the clock's power.
 
-    python python/benches/throughput.py --bundle onnx/brain-reduced --scenes 8 --markdown docs/results/performance.md
+    python python/benches/throughput.py --bundle onnx/brain-reduced --scenes 8 --markdown PAGE
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-//! Corrections: a few quasi-Newton iterations on the real elements after each prediction (`docs/results/corrections.md`).
+//! Corrections: a few quasi-Newton iterations on the real elements after each prediction (`docs/reference/corrections.md`).
 //!
 //! While there is contact, the predicted field is moved towards the equation of motion of the reference solver, discretised in time
 //! by BDF2: `r(u) = f_int(u) + M (a + alpha v) = 0` on the free nodes, with the contact nodes where the instruments hold them.

@@ -22,7 +22,7 @@ use worker::{Job, Shared, Task, panic_message, worker_loop};
 /// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs what
 /// one core reads in the meantime, some megabytes from cache. Measured (`cargo bench --bench kernels -- pool`, two cores that share
 /// their memory with others): reading alone gains nothing from a second thread up to 32 MB and loses below 4 MB; the products over the
-/// tables of a large mesh, which also compute, take a quarter less time on two (`brain-fine-reduced` in docs/results/performance.md).
+/// tables of a large mesh, which also compute, take a quarter less time on two (`brain-fine-reduced` in docs/results/speed.md).
 const SPLIT_BYTES: usize = 8 << 20;
 
 /// The same while workers are kept awake: the next job costs a look at one number in place of waking a thread.

@@ -18,6 +18,7 @@ import bundles
 import commands
 import english
 import links
+import results
 
 ROOT = Path(__file__).resolve().parents[2]
 RELEASE = Path(os.environ.get("UPT_LIB_DIR", ROOT / "target/release"))
@@ -98,6 +99,7 @@ def main() -> int:
     for name in ("README.md", "SUMMARY.md", "decisions/README.md"):
         tally.add(index(pages, name))
     tally.add(bundles.faults())
+    tally.add(results.faults())
     tally.add(book())
     for path in pages:
         page = links.page(path)

@@ -1,6 +1,6 @@
 """What the page of `upt view` reaches in headless Chromium: pictures a second, mouse to picture, the step meanwhile.
 
-    python3 tests/view/measure.py --bundle onnx/brain-reduced --markdown docs/results/performance.md
+    python3 tests/view/measure.py --bundle onnx/brain-reduced --markdown PAGE
 
 The mouse presses the middle of the organ and strokes to and fro, with an event every 8 ms as most mice send them; each
 counts. A picture is there when its last pixel is drawn (`whenDrawn` of drawing.js); the event's own time counts.

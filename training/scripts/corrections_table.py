@@ -1,7 +1,7 @@
-"""What corrections are worth: error, time and estimate by their number, into docs/results/corrections.md.
+"""What corrections are worth: error, time and estimate by their number.
 
     python training/scripts/corrections_table.py --upt target/release/upt --bundle onnx/brain-reduced --data DIR \
-        --counts 0,1,3,5,10,10@0.02 --page docs/results/corrections.md
+        --counts 0,1,3,5,10,10@0.02 --page PAGE
 
 Each case of the data is replayed through `upt rollout --json` with each count. The contact force is that of
 `upt_scene_contact_force`, summed over the nodes of a step, against the solver's over all steps with contact. The

@@ -1,7 +1,7 @@
 """What training keeps in memory on a dataset much larger than that: the largest resident set of a `train` command.
 
     python training/scripts/data_memory.py --config CONFIG.toml --mesh MESH [--prior PRIOR] [--vibration VIBRATION]
-        [--cases 200] [--frames 161] [--page docs/results/training.md]
+        [--cases 200] [--frames 161] [--page PAGE]
 
 Makes a dataset of that size in a temporary folder out of sparse files (a moving contact, all other displacements are
 holes that read as zeros), runs the command on it for `--seconds`, and prints or writes a Markdown table. Mapped pages

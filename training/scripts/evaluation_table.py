@@ -1,6 +1,6 @@
 """A Markdown table of results of `evaluate`, printed or written into a page:
 
-python training/scripts/evaluation_table.py A.json ... [--page docs/results/training.md]
+python training/scripts/evaluation_table.py A.json ... [--page PAGE]
 
 `NAME=A.json` names the bundle. `--paper` leaves the plain methods out and puts the paper's own figures beside the
 bundle's: its 40 cases of schemes 1-4, its 10 of scheme 5, its 10 on the fine mesh.

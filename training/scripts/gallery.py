@@ -1,7 +1,7 @@
-"""Makes the organs of docs/results/gallery.md with `upt make`, one command each; their certificates give its tables.
+"""Makes the organs of docs/results/accuracy.md with `upt make`, one command each; their certificates give its tables.
 Rigid tools teach one of them afterwards.
 
-    python training/scripts/gallery.py --upt target/release/upt --sofa FOLDER --out gallery
+    python training/scripts/gallery.py --upt target/release/upt --sofa FOLDER --out gallery --page PAGE
 
 FOLDER is a checkout of github.com/sofa-framework/sofa (its share/mesh/liver-smooth.obj, LGPL 2.1). The kidney is a
 formula and the box a lattice, both written here. Bundles that are there are only read again.
@@ -19,7 +19,6 @@ import numpy as np
 from upt_training.box_mesh import box_mesh
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "results" / "gallery.md"
 TAUGHT = ["brain-supported"]
 
 
@@ -127,10 +126,11 @@ def main() -> None:
     parser.add_argument("--sofa", type=Path, required=True)
     parser.add_argument("--out", type=Path, default=Path("gallery"))
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--page", type=Path, required=True, help="page to write into (tests/docs/results.py makes it)")
     parser.add_argument("--only", nargs="*", help="make these alone; the table keeps the lines of others")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    before, rest = PAGE.read_text(encoding="utf-8").split("<!-- gallery.py: begin -->")
+    before, rest = options.page.read_text(encoding="utf-8").split("<!-- gallery.py: begin -->")
     table, after = rest.split("<!-- gallery.py: end -->")
     rows = []
     for name, arguments in organs(options.out, options.sofa).items():
@@ -150,7 +150,7 @@ def main() -> None:
         "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     table = "\n".join([*head, *rows])
-    PAGE.write_text(
+    options.page.write_text(
         f"{before}<!-- gallery.py: begin -->\n{table}\n<!-- gallery.py: end -->{after}", encoding="utf-8", newline="\n"
     )
 

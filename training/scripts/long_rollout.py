@@ -1,6 +1,6 @@
 """Ten cases in a row without a reset, 1,600 steps: does the error grow?
 
-    python training/scripts/long_rollout.py BUNDLE --data DATA [--count 10] [--page docs/results/training.md]
+    python training/scripts/long_rollout.py BUNDLE --data DATA [--count 10] [--page PAGE]
 
 Prints or writes a Markdown table: MSE of each case inside the long rollout and of the same case from rest, and the
 largest displacement of its last frame. Each case ends without contact, so the next one starts (nearly) at rest.

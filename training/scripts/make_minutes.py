@@ -1,6 +1,6 @@
-"""What each minute of `upt make` buys: SOFA's liver and the brain of 21,708 nodes (docs/results/gallery.md).
+"""What each minute of `upt make` buys: SOFA's liver and the brain of 21,708 nodes (docs/results/accuracy.md).
 
-    python training/scripts/make_minutes.py --upt target/release/upt --sofa FOLDER --out minutes
+    python training/scripts/make_minutes.py --upt target/release/upt --sofa FOLDER --out minutes --page PAGE
     python training/scripts/make_minutes.py --sofa FOLDER --out minutes --only 21,708
 
 FOLDER is a checkout of github.com/sofa-framework/sofa. All budgets share a work folder, as a user's own runs would, so
@@ -16,7 +16,6 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "results" / "gallery.md"
 COARSE = ["--nodes", "1200", "--domain", "ball:-20,100,60,55", "--natural", "40"]
 COLUMNS = [
     "nodes",
@@ -95,6 +94,7 @@ def main() -> None:
     parser.add_argument("--sofa", type=Path, required=True)
     parser.add_argument("--out", type=Path, default=Path("minutes"))
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--page", type=Path, required=True, help="page to write into (tests/docs/results.py makes it)")
     parser.add_argument("--only", nargs="*", help="make these alone; the table keeps the lines of others")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -110,7 +110,7 @@ def main() -> None:
             rows[nodes].append(row(nodes, minutes, bundle, work, gigabytes))
     begin, end = "<!-- make_minutes.py: begin -->", "<!-- make_minutes.py: end -->"
     # Read only now: another run may have written its lines in between.
-    before, rest = PAGE.read_text(encoding="utf-8").split(begin)
+    before, rest = options.page.read_text(encoding="utf-8").split(begin)
     table, after = rest.split(end)
     kept = [line for line in table.splitlines() if line.startswith("| ") and not line.startswith("| nodes")]
     lines = []
@@ -118,7 +118,7 @@ def main() -> None:
         lines += rows.get(nodes) or [line for line in kept if line.startswith(f"| {nodes} |")]
     head = ["| " + " | ".join(COLUMNS) + " |", "|---|" + "---:|" * (len(COLUMNS) - 1)]
     table = "\n".join([*head, *lines])
-    PAGE.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8", newline="\n")
+    options.page.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

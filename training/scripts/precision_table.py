@@ -1,6 +1,6 @@
 """What half-precision and int8 graphs cost in accuracy, over whole rollouts: a Markdown table.
 
-    python training/scripts/precision_table.py BUNDLE=DATA ... [--count 8] [--page docs/results/training.md]
+    python training/scripts/precision_table.py BUNDLE=DATA ... [--count 8] [--page PAGE]
 
 A copy of each bundle gets the graphs (`variants`); float32, float16 and int8 then roll the same held-out cases from
 rest, each on its own states, in ONNX Runtime on the CPU. For the error of one step both networks get the inputs of the

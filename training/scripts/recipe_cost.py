@@ -39,7 +39,7 @@ def main() -> None:
     parser.add_argument("--vibration", type=Path)
     parser.add_argument("--steps", type=int, default=30)
     parser.add_argument("--cases", type=int, default=2)
-    parser.add_argument("--page", type=Path, help="page to write into: docs/results/training.md")
+    parser.add_argument("--page", type=Path, help="page to write into")
     options = parser.parse_args()
     torch.set_num_threads(1)
     settings, mesh = load_settings(options.config), find_mesh(options.mesh, options.data)

@@ -1,7 +1,7 @@
 """Whole rollouts through the library, by scheme and number of corrections, and the second after an abrupt release.
 
     python training/scripts/rollout_table.py --upt target/release/upt --bundle onnx/brain-paper --data DIR \
-        --counts 0,3 --keep FOLDER --page docs/results/training.md --marks "brain-paper rollouts"
+        --counts 0,3 --keep FOLDER --page PAGE --marks "brain-paper rollouts"
 
 Each case of the data is replayed through `upt rollout --json`; `--keep` holds these results, so an interrupted run
 goes on. The second after a release is the mean over cases of the MSE of the frames within a second after a push of

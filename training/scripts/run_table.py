@@ -1,4 +1,4 @@
-"""What training runs got and reached: `run_table.py RUN[=JSON] ... --evaluation JSON --page docs/results/training.md`.
+"""What training runs got and reached: `run_table.py RUN[=JSON] ... --evaluation JSON --page PAGE`.
 
 Reads the last scores in `log.csv` and the steps and CPU time in `last.pt` of each run folder; a run that has not been
 scored yet has no error in the table. `RUN=JSON` takes the scores that `evaluate` gave its bundle. `--evaluation` is

@@ -122,7 +122,7 @@ def parser() -> argparse.ArgumentParser:
     bench.add_argument("--steps", type=int, default=4, help="places of the schedule, an optimiser step each")
     bench.add_argument("--rounds", type=int, default=2, help="the fastest of so many counts")
     bench.add_argument("--draws", type=int, default=16, help="windows averaged where rows or supernodes are drawn")
-    bench.add_argument("--page", type=Path, help="page to write into: docs/results/training.md")
+    bench.add_argument("--page", type=Path, help="page to write into")
 
     scaling = commands.add_parser("scaling", help="error against parameters and core-hours: tables and plots")
     scaling.add_argument("--data", type=Path, required=True)
@@ -139,7 +139,7 @@ def parser() -> argparse.ArgumentParser:
     scaling.add_argument("--cases", type=int, default=4, help="held-out cases scored")
     scaling.add_argument("--evaluation", type=Path, help="JSON of `evaluate` of a bundle, to compare with")
     scaling.add_argument("--report-only", action="store_true", help="tables and plots of what is done")
-    scaling.add_argument("--page", type=Path, help="page to write into: docs/results/training.md and its images")
+    scaling.add_argument("--page", type=Path, help="page to write into, and images/ beside it")
 
     ablate = commands.add_parser("ablate", help="variants of a configuration at one small budget: tables and plots")
     ablate.add_argument("suite", choices=["windows", "tricks"])
@@ -158,7 +158,7 @@ def parser() -> argparse.ArgumentParser:
     ablate.add_argument("--label", default="", help="tells reports of one suite apart: in the page's marks, in names")
     ablate.add_argument("--cases", type=int, default=10, help="held-out cases scored")
     ablate.add_argument("--only", nargs="*", help="only these variants, by name")
-    ablate.add_argument("--page", type=Path, help="page to write into: docs/results/training.md and its images")
+    ablate.add_argument("--page", type=Path, help="page to write into, and images/ beside it")
     ablate.add_argument("--device", default="auto")
     ablate.add_argument("--threads", type=int, default=1)
     return top

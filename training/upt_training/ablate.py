@@ -2,7 +2,7 @@
 
 Suites: `windows` (pure teacher forcing and stochastic teacher forcing with windows 2 to 8, the paper's Fig. "window
 size" and Fig. "error accumulation") and `tricks` (each departure from the paper's recipe, taken away one at a time).
-Results go to `OUT/SUITE.{json,md}` and `OUT/*.png`, and with `--page docs/results/training.md` into that page and
+Results go to `OUT/SUITE.{json,md}` and `OUT/*.png`, and with `--page PAGE` into that page and
 the images next to it; finished variants are not run again. With `--minutes` a variant gets time in place of steps, and
 what it has so far is in `OUT/SUITE.json` after each minute. `--merge` joins the files of runs side by side.
 """

@@ -1,4 +1,4 @@
-"""What a developer would pick instead, on the same mesh and poses: `cargo xtask rivals` (docs/results/rivals.md).
+"""What a developer would pick instead, on the same mesh and poses: `cargo xtask rivals` (docs/results/accuracy.md).
 
 Every run stands between two runs of libupt with three corrections, and its time is a ratio to them. A row is written
 to OUT/rows.jsonl as soon as it is measured, and rows that are there are not measured again, so an interrupted study

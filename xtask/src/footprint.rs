@@ -1,7 +1,8 @@
-//! `cargo xtask footprint`: what each cargo feature of libupt adds, into docs/results/performance.md: the library is built
+//! `cargo xtask footprint`: what each cargo feature of libupt adds: the library is built
 //! once for each set of features, stripped, and read. What a process maps is `tests/mapped_libraries.rs`.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
@@ -22,15 +23,18 @@ struct Build {
     needed: String,
 }
 
-pub fn run(workspace: &Workspace) -> Result<bool> {
+pub fn run(workspace: &Workspace, page: Option<&Path>) -> Result<bool> {
     ensure!(
         cfg!(target_os = "linux"),
         "the footprint is read from ELF files: run it on Linux"
     );
     let builds = FEATURES.map(|(features, _)| build(workspace, features));
     let builds = builds.into_iter().collect::<Result<Vec<Build>>>()?;
-    let page = workspace.path("docs/results/performance.md");
-    write_between_markers(&page, "footprint", |_| table(&builds))?;
+    let table = table(&builds)?;
+    print!("{table}");
+    if let Some(page) = page {
+        write_between_markers(page, "footprint", |_| Ok(table))?;
+    }
     Ok(true)
 }
 

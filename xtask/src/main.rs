@@ -50,9 +50,9 @@ enum Task {
         after_help = "Examples:\n  cargo xtask demo\n  cargo xtask demo --organ liver\n  cargo xtask demo --scheme 3 --seed 7"
     )]
     Demo(demo::Options),
-    /// Run the speed tables and write docs/results/performance.md.
+    /// Run the speed tables of docs/results/speed.md.
     #[command(
-        after_help = "Examples:\n  cargo xtask bench --quick\n  cargo xtask bench --only kernels --keep-docs --json rows.json"
+        after_help = "Examples:\n  cargo xtask bench --quick\n  cargo xtask bench --only kernels --json rows.json"
     )]
     Bench(bench::Options),
     /// Show a bundle in the browser, with all set-up.
@@ -74,19 +74,21 @@ enum Task {
         #[arg(long, default_value = "target/site")]
         out: std::path::PathBuf,
     },
-    /// Put tables that `cargo xtask study report` wrote into a page, such as that of docs/results/README.md.
-    #[command(after_help = "Example:\n  cargo xtask readme --report target/report/report.md")]
+    /// Put tables that `cargo xtask study report` wrote into a page.
+    #[command(
+        after_help = "Example:\n  cargo xtask readme --report target/report/report.md --page target/results/paper-measure.md"
+    )]
     Readme {
         /// report.md files of `cargo xtask study report`, in the order in which they should appear.
         #[arg(long = "report", value_name = "FILE", required = true)]
         reports: Vec<std::path::PathBuf>,
         /// The page that takes them, between its markers; from the repository's root.
-        #[arg(long, value_name = "FILE", default_value = "docs/results/README.md")]
+        #[arg(long, value_name = "FILE")]
         page: std::path::PathBuf,
     },
     /// Compare with what a developer would pick instead, on the same mesh and poses: MuJoCo, Newton, Jolt, rapier, Bullet.
     #[command(
-        after_help = "Examples:\n  cargo xtask rivals -- --cases press --only libupt Jolt\n  cargo xtask rivals -- --page docs/results/rivals.md"
+        after_help = "Examples:\n  cargo xtask rivals -- --cases press --only libupt Jolt\n  cargo xtask rivals -- --page target/results/rivals.md"
     )]
     Rivals {
         /// Arguments of the study, such as `--help`.
@@ -102,9 +104,13 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
-    /// Build libupt for each cargo feature and write what it adds to docs/results/performance.md.
+    /// Build libupt for each cargo feature and tell what it adds.
     #[command(after_help = "Example:\n  cargo xtask footprint")]
-    Footprint,
+    Footprint {
+        /// Page whose table between the marks is replaced.
+        #[arg(long, value_name = "FILE")]
+        page: Option<std::path::PathBuf>,
+    },
     /// Write include/upt.h and the C# bindings from the library's source.
     #[command(after_help = "Examples:\n  cargo xtask header\n  cargo xtask header --check")]
     Header {
@@ -155,7 +161,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Readme { reports, page } => upkeep::readme(workspace, &page, &reports),
         Task::Rivals { arguments } => rivals::run(workspace, &arguments),
         Task::Study { arguments } => upkeep::study(workspace, &arguments),
-        Task::Footprint => footprint::run(workspace),
+        Task::Footprint { page } => footprint::run(workspace, page.as_deref()),
         Task::Header { check } => upkeep::header(workspace, check),
         Task::Bundle { module, arguments } => upkeep::bundle(workspace, &module, &arguments),
         Task::Ort { platform, version } => {

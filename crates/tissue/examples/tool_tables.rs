@@ -1,5 +1,5 @@
-//! Writes the tables of contact with tools in docs/results/reference-solver.md:
-//! `cargo run --release -p tissue --example tool_tables`.
+//! Writes tables of contact with tools in docs/results/solver.md:
+//! `python tests/docs/results.py run solver -- cargo run --release -p tissue --example tool_tables`, which makes the page that it looks for.
 //!
 //! The text between `<!-- tools -->`, `<!-- penetration -->` or `<!-- hertz -->` and the next `<!-- end -->` is replaced.
 
@@ -16,7 +16,7 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 
 fn main() -> Outcome<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let page = root.join("docs/results/reference-solver.md");
+    let page = root.join("target/results/solver.md");
     let brain = Mesh::read(&root.join("onnx/meshes/brain-coarse.mesh.safetensors"))?;
     for (marker, table) in [
         ("penetration", over_time(&brain)?),

@@ -1,1 +1,1 @@
-"""Reduced models: linear-elastic response and a learned correction in a few modes (docs/results/reduced.md)."""
+"""Reduced models: linear-elastic response and a learned correction in a few modes (docs/reference/reduced.md)."""

@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: the speed tables, into docs/results/performance.md.
+//! `cargo xtask bench`: the speed tables of docs/results/speed.md.
 //!
 //! Every bench target of `upt` and `tissue` prints its results as lines `ROW {json}`; this collects
 //! them. A row is {"name","value","unit","against","ratio","error","bar","goal"}; null where it has none.
@@ -32,9 +32,9 @@ pub struct Options {
     /// Only what these targets call so (of `step`: bundles whose name contains it); the tables keep their other rows.
     #[arg(long, requires = "only")]
     part: Option<String>,
-    /// Do not touch docs/results/performance.md.
-    #[arg(long)]
-    keep_docs: bool,
+    /// Page whose tables between the marks are replaced; `tests/docs/results.py run speed` makes it and keeps them.
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
 }
 
 /// A bench target: package and name.
@@ -89,8 +89,8 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         std::fs::write(path, serde_json::to_string_pretty(&all)? + "\n")
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
-    if !options.keep_docs {
-        page::write(workspace, options.quick, options.part.is_some(), &measured)?;
+    if let Some(page) = &options.page {
+        page::write(page, options.quick, options.part.is_some(), &measured)?;
     }
     Ok(!failed)
 }

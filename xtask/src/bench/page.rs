@@ -1,11 +1,12 @@
-//! The measured part of docs/results/performance.md: a section a bench target, between two markers.
+//! The measured part of a page: a section a bench target, between two markers.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::path::Path;
 
 use anyhow::Result;
 
-use crate::workspace::{Workspace, write_between_markers};
+use crate::workspace::write_between_markers;
 
 /// Title and text of each section.
 type Sections = BTreeMap<String, String>;
@@ -21,14 +22,13 @@ pub struct Measured {
 
 /// Replaces the sections of the tables that were measured; the others stay, with the machine that they name, and so
 /// does what is written by hand around the markers. `partly`: rows that were not measured stay too.
-pub fn write(workspace: &Workspace, quick: bool, partly: bool, measured: &Measured) -> Result<()> {
+pub fn write(page: &Path, quick: bool, partly: bool, measured: &Measured) -> Result<()> {
     let short = match quick {
         true => ", short runs (`--quick`)",
         false => "",
     };
     let how = format!("Measured on {}{short}.", machine());
-    let page = workspace.path("docs/results/performance.md");
-    write_between_markers(&page, "bench", |old| {
+    write_between_markers(page, "bench", |old| {
         let mut sections = sections(old);
         for (title, table) in &measured.tables {
             let old = sections.get(title).filter(|_| partly);

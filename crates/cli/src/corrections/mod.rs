@@ -1,4 +1,4 @@
-//! `upt corrections`: gives a bundle with a linear response the coarse space that its corrections need (`docs/results/corrections.md`).
+//! `upt corrections`: gives a bundle with a linear response the coarse space that its corrections need (`docs/reference/corrections.md`).
 //!
 //! Sources, none of which is a trajectory: natural modes, the bundle's own residual modes where it has them, and patches
 //! (what a few quasi-Newton steps add to the linear response of pushes all over the domain).

@@ -22,7 +22,7 @@ use section::Section;
 #[derive(Args)]
 #[command(after_help = "Examples:
   upt validate
-  upt validate --data measured --markdown docs/results/reality.md")]
+  upt validate --data measured --markdown page.md")]
 pub struct Options {
     /// Folder with brain.csv and silicone.csv.
     #[arg(long, value_name = "FOLDER")]

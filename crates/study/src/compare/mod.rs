@@ -28,7 +28,7 @@ use upt_cli::progress;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  upt-study compare --bundle onnx/brain-coarse-reduced --markdown docs/results/stability.md --images docs/results/images
+  upt-study compare --bundle onnx/brain-coarse-reduced --markdown PAGE --images docs/results/images
   upt-study compare --bundle onnx/brain-coarse-reduced --uncorrected
   upt-study compare --bundle onnx/brain-coarse-reduced --steps 0 --tools 20
   upt-study compare --bundle onnx/brain-fast --steps 0 --held-out DATASET --held-out DATASET-S5/case-00000.trajectory.safetensors --outside DATASET-HARD/case-00000.trajectory.safetensors")]

@@ -35,7 +35,7 @@ use upt_cli::progress;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  upt-study haptics onnx/brain-coarse-reduced --minutes 1 --load 2\n  upt-study haptics onnx/brain-coarse-reduced --hours 24 --within 20\n  upt-study haptics onnx/brain-reduced --minutes 10 --reference 4 --markdown docs/results/frames-and-haptics.md --plot force.svg"
+    after_help = "Examples:\n  upt-study haptics onnx/brain-coarse-reduced --minutes 1 --load 2\n  upt-study haptics onnx/brain-coarse-reduced --hours 24 --within 20\n  upt-study haptics onnx/brain-reduced --minutes 10 --reference 4 --markdown PAGE --plot force.svg"
 )]
 pub struct Options {
     /// Bundle folder with corrections.

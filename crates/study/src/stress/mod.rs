@@ -20,7 +20,7 @@ use upt_cli::counted::counted;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  upt-study stress --quick\n  upt-study stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown docs/results/stability.md\n  upt-study stress --no-reference --sudden --bundle onnx/brain-reduced"
+    after_help = "Examples:\n  upt-study stress --quick\n  upt-study stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown PAGE\n  upt-study stress --no-reference --sudden --bundle onnx/brain-reduced"
 )]
 pub struct Options {
     /// Bundle folders to stress. Default: only the reference solver.

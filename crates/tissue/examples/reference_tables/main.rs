@@ -1,5 +1,5 @@
-//! Writes the tables of docs/results/reference-solver.md:
-//! `cargo run --release -p tissue --example reference_tables [-- TABLE..]`.
+//! Writes tables of docs/results/solver.md:
+//! `python tests/docs/results.py run solver -- cargo run --release -p tissue --example reference_tables`, which makes the page that it looks for.
 //!
 //! The tables are `verification`, `laws`, `locking` and `scaling`; all where none is named. The text between `<!-- TABLE -->`
 //! and the next `<!-- end -->` is replaced.
@@ -22,7 +22,7 @@ type Vectors = Vec<[f32; 3]>;
 
 fn main() -> Outcome<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let page = root.join("docs/results/reference-solver.md");
+    let page = root.join("target/results/solver.md");
     let mut text = std::fs::read_to_string(&page)?;
     let brain = Mesh::read(&root.join("onnx/meshes/brain-coarse.mesh.safetensors"))?;
     let fine = Mesh::read(&root.join("onnx/meshes/brain.mesh.safetensors"))?;

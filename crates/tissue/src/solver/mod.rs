@@ -318,7 +318,7 @@ impl Solver {
     }
 
     /// Bytes that an inner step streams through, and its floating-point operations:
-    /// the figures behind the roofline in `docs/results/reference-solver.md`.
+    /// the figures behind the roofline in `docs/reference/solver.md`.
     pub fn step_cost(&self) -> StepCost {
         let partition = &self.partition;
         let slots: usize = partition.chunks.iter().map(|c| c.slot_count()).sum();
