@@ -1,17 +1,17 @@
 """The tables of docs/results: figures are data in docs/results/data, and pages show parts of them between marks.
 
-    python tests/docs/results.py run NAME -- COMMAND ... {page}  # run a command that writes tables, and keep them in data/NAME.json
+    python tests/docs/results.py run NAME -- COMMAND ... {page}  # run a command that writes tables, and keep them
     python tests/docs/results.py show                            # the pages' tables from the data
-    python tests/docs/results.py ages                            # which figures are older than the code that they measure
+    python tests/docs/results.py ages                            # which figures are older than the code they measure
 
-Commands write Markdown between marks of their own. `run` gives them a page with the marks and tables that the data have (`{page}` is its
-path, target/results/NAME.md), and keeps what changed, with the command, machine, date and commit, and
-images that it left in target/results/images. A new file of data begins with
-`--mark "LINE" "LINE"`, the marks that the command looks for.
+Commands write Markdown between marks of their own. `run` gives them a page with the marks and tables of data/NAME.json
+(`{page}` is its path, target/results/NAME.md), and keeps what changed, with the command, machine, date and commit, and
+images that it left in target/results/images. New files begin with `--mark "LINE" "LINE"`, that the command looks for.
 
-A page shows a table behind `<!-- results: NAME NUMBER | COLUMN; COLUMN | COLUMN = VALUE -->`, up to the next empty line; tables are counted
-from 1. `NAME said NUMBER ...` are the sentences before tables, `NAME after NUMBER ...` those at the end of blocks. Columns and the condition on rows (`~`: a regular expression) may be left out; a column without a title is `row`. The docs stage
-checks that pages are what their data make them, and that a page names every file.
+A page shows a table behind `<!-- results: NAME NUMBER | COLUMN; COLUMN | COLUMN = VALUE -->`, to the next empty line;
+tables are counted from 1. `NAME said NUMBER ...` are the sentences before tables, `NAME after NUMBER ...` those at the
+end of blocks. Columns and the condition on rows (`~`: a regular expression) may be left out; a column without a title
+is `row`. The docs stage checks that pages are what their data make them, and that a page names every file.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def line_of(row: list[str]) -> str:
 
 
 def parsed(text: str) -> dict:
-    """The tables of a piece of Markdown, each with its heading and the sentences before it, and the sentences after the last."""
+    """The tables of a piece of Markdown, each with its heading and sentences, and the sentences after the last."""
     tables, said, title = [], [], ""
     lines = iter([*text.splitlines(), ""])
     for line in lines:
@@ -115,12 +115,12 @@ def run(options: argparse.Namespace) -> None:
     """Runs a command on a page of its own and keeps what it wrote."""
     blocks = read(options.name)
     known = {block["begin"] for block in blocks}
-    blocks += [
-        {"begin": begin, "end": end, **parsed("")} for begin, end in options.mark or [] if begin not in known
-    ]
+    blocks += [{"begin": begin, "end": end, **parsed("")} for begin, end in options.mark or [] if begin not in known]
     page = ROOT / f"target/results/{options.name}.md"
     (page.parent / "images").mkdir(parents=True, exist_ok=True)
-    page.write_text("".join(f"{block['begin']}\n{written(block)}{block['end']}\n" for block in blocks), encoding="utf-8")
+    page.write_text(
+        "".join(f"{block['begin']}\n{written(block)}{block['end']}\n" for block in blocks), encoding="utf-8"
+    )
     command = [word.replace("{page}", str(page)) for word in options.command]
     subprocess.run(command, cwd=ROOT, check=True)
     for image in (page.parent / "images").glob("*"):
@@ -199,7 +199,9 @@ def faults() -> list[str]:
             found.append(f"docs/results/data/{file.name}: no page links it")
         for block in read(file.stem):
             if any(parsed(written(block))[key] != block[key] for key in ("tables", "after")):
-                found.append(f"docs/results/data/{file.name}: {block['begin']} would change on its way through Markdown")
+                found.append(
+                    f"docs/results/data/{file.name}: {block['begin']} would change on its way through Markdown"
+                )
     return found
 
 

@@ -19,8 +19,8 @@ def measure_envelope(mesh: Mesh, cases: list[Case]) -> dict:
     """Largest push and push rate (mm), range of contact areas (mm²), largest displacement times two as the bound.
 
     They are those of prescribed contacts: cases of tools do not count, whose limits are measured with corrections
-    (`cargo xtask study envelope`), and whose first touch is one node and whose slip is fast. An area is that of one instrument: cases
-    of two, which may adjoin, do not count for it.
+    (`cargo xtask study envelope`), and whose first touch is one node and whose slip is fast. An area is that of one
+    instrument: cases of two, which may adjoin, do not count for it.
     """
     areas = mesh.node_areas()
     push, rate, smallest, widest, largest = 0.0, 0.0, np.inf, 0.0, 0.0
