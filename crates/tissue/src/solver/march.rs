@@ -10,10 +10,8 @@
 use super::barrier::SpinBarrier;
 use super::body_load::{self, BodyLoad};
 use super::fields::{Fields, Node};
-use super::support::Support;
-use super::ties::{Frames, Slots, Ties};
-use super::touch::{Access, Touch};
-use contact::Vector;
+use super::ties::Ties;
+use super::touch::Touch;
 use elements::PADDED;
 use elements::{Chunk, Kernels, Partition};
 use lanes::FlushToZero;
@@ -69,13 +67,13 @@ pub(crate) struct March<'a> {
 /// Barriers separate the phases, so no location is written by one thread while
 /// another touches it.
 #[derive(Clone, Copy)]
-struct Shared {
-    displacement: *mut Node,
-    increment: *mut Node,
-    force: *mut Node,
+pub(super) struct Shared {
+    pub displacement: *mut Node,
+    pub increment: *mut Node,
+    pub force: *mut Node,
     /// Loads of the inner step; null where there are none.
     load: *const Node,
-    tallies: *mut Tally,
+    pub tallies: *mut Tally,
 }
 
 impl Shared {
@@ -328,50 +326,6 @@ impl March<'_> {
         }
     }
 
-    /// Ties and contact with the tools after the free update; all other threads wait.
-    unsafe fn touch_phase(&self, shared: Shared, step: u32) {
-        // Poisoned only where this thread panicked, which ends the march.
-        let mut touch = self.touch.as_ref().and_then(|touch| touch.lock().ok());
-        let mut ties = self.ties.as_ref().and_then(|ties| ties.lock().ok());
-        let load = self.load.as_ref().and_then(|load| load.lock().ok());
-        let slots = Slots {
-            displacement: shared.displacement,
-            increment: shared.increment,
-            force: shared.force,
-            beta: self.beta,
-        };
-        let mut work = 0.0;
-        if let Some(ties) = &mut ties {
-            let mut frames = Ends {
-                touch: touch.as_deref_mut().map(|touch| &mut **touch),
-                support: load.as_ref().and_then(|load| load.support.as_ref()),
-                step,
-            };
-            // SAFETY: the barriers around the phase keep other threads out of the arrays.
-            unsafe { ties.resolve(slots, &mut frames, step) };
-        }
-        if let Some(touch) = &mut touch {
-            let access = Access {
-                displacement: shared.displacement,
-                increment: shared.increment,
-                force: shared.force,
-                beta: self.beta,
-            };
-            let tied = |slot| {
-                ties.as_ref()
-                    .map_or(Vector::ZERO, |ties| ties.change_at(slot))
-            };
-            // SAFETY: as above.
-            work += unsafe { touch.resolve(access, step, tied) };
-        }
-        if let Some(ties) = &ties {
-            // SAFETY: as above.
-            work += unsafe { ties.work(slots) };
-        }
-        // SAFETY: as above.
-        unsafe { (*shared.tallies).work += work };
-    }
-
     /// Work of the instrument on one contact node over this step, nJ:
     /// the force that the discrete equation of motion asks for, times the mean of both increments.
     unsafe fn follow(&self, shared: Shared, path: &Path, step: u32) -> f64 {
@@ -389,29 +343,6 @@ impl March<'_> {
                 (inertia + drag - f64::from(force.0[k])) * 0.5 * (new + old)
             })
             .sum()
-    }
-}
-
-/// What the far ends of ties are on.
-struct Ends<'a> {
-    touch: Option<&'a mut Touch>,
-    support: Option<&'a Support>,
-    step: u32,
-}
-
-impl Frames for Ends<'_> {
-    fn at(&self, tool: Option<u32>, place: Vector, part: f32) -> Vector {
-        match (tool, &self.touch, self.support) {
-            (Some(tool), Some(touch), _) => touch.pose_at(tool, part).transform_point(place),
-            (None, _, Some(support)) => support.carried(place, part),
-            _ => place,
-        }
-    }
-
-    fn feel(&mut self, tool: u32, point: Vector, force: Vector) {
-        if let Some(touch) = &mut self.touch {
-            touch.feel(tool, point, force, self.step);
-        }
     }
 }
 

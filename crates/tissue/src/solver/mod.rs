@@ -24,6 +24,8 @@ mod stiffest;
 mod support;
 mod ties;
 mod touch;
+mod touch_phase;
+mod tying;
 // Against the energy of `statics`.
 #[cfg(all(test, feature = "linear"))]
 mod tests;

@@ -6,9 +6,7 @@
 
 use super::fields::Node;
 use super::touch::{REPORT_S, SWEEPS};
-use super::{Solver, SolverError};
 use contact::{End, Sample, Tie, Vector};
-use elements::PADDING;
 
 /// The tension that breaks a tie is a mean over this time, s: one inner step's is noisy.
 const BREAK_S: f64 = 0.001;
@@ -80,83 +78,6 @@ fn vector(node: &Node) -> Vector {
     Vector::new(node.0[0], node.0[1], node.0[2])
 }
 
-impl Solver {
-    /// Gives the solver the ties of the frames to come. A tie's place in the list is its identity: it stays broken there until it has no stiffness, and
-    /// its far end goes on a line to where it is now within the next frame, unless it is in another frame or on another tool.
-    ///
-    /// # Errors
-    /// [`SolverError::Tie`] for one that there cannot be; nothing has changed.
-    pub fn set_ties(&mut self, ties: &[Tie]) -> Result<(), SolverError> {
-        for (index, tie) in ties.iter().enumerate() {
-            self.check_tie(tie)
-                .map_err(|reason| SolverError::Tie { index, reason })?;
-        }
-        let before = std::mem::take(&mut self.ties).unwrap_or_default().tied;
-        let made = ties.iter().enumerate().map(|(index, tie)| {
-            let known = before.get(index).filter(|known| known.goes_on_as(tie));
-            let far = match tie.end {
-                End::Tissue(sample) => Some(sample),
-                _ => None,
-            };
-            let near = tie.point.entries();
-            let far = far.iter().flat_map(Sample::entries);
-            let nodes = near.chain(far.map(|(node, weight)| (node, -weight)));
-            let nodes: Vec<(u32, f32)> = nodes.collect();
-            let rest = |(node, weight): &(u32, f32)| {
-                Vector::from(self.positions[*node as usize]) * *weight
-            };
-            let entries = nodes.iter().map(|&(node, weight)| Entry {
-                slot: self.partition.slot_of_node[node as usize],
-                weight,
-                earlier: Vector::ZERO,
-            });
-            let place = place_of(&tie.end);
-            Tied {
-                tie: *tie,
-                entries: entries.collect(),
-                rest: nodes.iter().map(rest).sum(),
-                places: [known.map_or(place, |known| known.places[1]), place],
-                force: Vector::ZERO,
-                mean: known.map_or(0.0, |known| known.mean),
-                broke_s: known.and_then(|known| known.broke_s),
-                length: 0.0,
-                sum: Vector::ZERO,
-            }
-        });
-        let tied: Vec<Tied> = made.collect();
-        self.ties = (!tied.is_empty()).then_some(Ties {
-            tied,
-            ..Ties::default()
-        });
-        Ok(())
-    }
-
-    fn check_tie(&self, tie: &Tie) -> Result<(), String> {
-        tie.check()?;
-        let tools = self.touch.as_ref().map_or(0, |touch| touch.tool_count());
-        if let End::Tool { tool, .. } = tie.end
-            && tool as usize >= tools
-        {
-            return Err(format!("is tied to tool {tool} of {tools}"));
-        }
-        let far = match tie.end {
-            End::Tissue(sample) => sample.nodes,
-            _ => tie.point.nodes,
-        };
-        for node in tie.point.nodes.into_iter().chain(far) {
-            if self
-                .partition
-                .slot_of_node
-                .get(node as usize)
-                .is_none_or(|slot| *slot == PADDING)
-            {
-                return Err(format!("node {node} is none of the body"));
-            }
-        }
-        Ok(())
-    }
-}
-
 impl Tied {
     /// Whether it is this tie that another list has in its place.
     fn goes_on_as(&self, tie: &Tie) -> bool {
@@ -197,6 +118,42 @@ pub(super) struct Slots {
 }
 
 impl Ties {
+    /// Ties that go on from those before; `node` gives the slot of a mesh node and where it is at rest.
+    pub fn following(before: Ties, ties: &[Tie], node: impl Fn(u32) -> (u32, Vector)) -> Ties {
+        let made = ties.iter().enumerate().map(|(index, tie)| {
+            let known = before.tied.get(index).filter(|known| known.goes_on_as(tie));
+            let far = match tie.end {
+                End::Tissue(sample) => Some(sample),
+                _ => None,
+            };
+            let near = tie.point.entries();
+            let far = far.iter().flat_map(Sample::entries);
+            let nodes = near.chain(far.map(|(node, weight)| (node, -weight)));
+            let nodes: Vec<(u32, f32)> = nodes.collect();
+            let entries = nodes.iter().map(|&(own, weight)| Entry {
+                slot: node(own).0,
+                weight,
+                earlier: Vector::ZERO,
+            });
+            let place = place_of(&tie.end);
+            Tied {
+                tie: *tie,
+                entries: entries.collect(),
+                rest: (nodes.iter().map(|(own, weight)| node(*own).1 * *weight)).sum(),
+                places: [known.map_or(place, |known| known.places[1]), place],
+                force: Vector::ZERO,
+                mean: known.map_or(0.0, |known| known.mean),
+                broke_s: known.and_then(|known| known.broke_s),
+                length: 0.0,
+                sum: Vector::ZERO,
+            }
+        });
+        Ties {
+            tied: made.collect(),
+            ..Ties::default()
+        }
+    }
+
     /// Starts a frame of `steps` inner steps of `dt` at a time since rest.
     pub fn begin(&mut self, start_s: f64, steps: u32, dt: f64) {
         (self.start_s, self.steps, self.dt) = (start_s, steps, dt);
