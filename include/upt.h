@@ -408,6 +408,26 @@
 #define UPT_MODE_GRASP 1
 
 /**
+ * A tie's far end is in the mesh's frame, which goes with the support.
+ */
+#define UPT_END_SUPPORT 0
+
+/**
+ * A tie's far end is in the world, which is the mesh's frame where no support moves.
+ */
+#define UPT_END_WORLD 1
+
+/**
+ * A tie's far end is on an instrument.
+ */
+#define UPT_END_INSTRUMENT 2
+
+/**
+ * A tie's far end is another point of the tissue: a suture.
+ */
+#define UPT_END_TISSUE 3
+
+/**
  * Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.
  */
 #define UPT_ABI_VERSION 1
@@ -760,6 +780,69 @@ typedef struct upt_pressure {
 } upt_pressure;
 
 /**
+ * A tie: a spring between a point of the tissue and something else, an element of `upt_input.ties`.
+ */
+typedef struct upt_tie {
+  /**
+   * `sizeof(upt_tie)`, the same in every element of an array.
+   */
+  uint32_t struct_size;
+  /**
+   * What it is tied to: `UPT_END_*`.
+   */
+  int32_t to;
+  /**
+   * The point of the tissue: nodes, of which one at least is free and near the domain, ...
+   */
+  uint32_t nodes[3];
+  /**
+   * ... and their weights, 0 or more, with the sum 1; all zero: the first node alone. `upt_scene_tie_points` finds both.
+   */
+  float weights[3];
+  /**
+   * Where its far end is at the end of the step, mm: in the mesh's frame, in the world, or in the instrument's frame. It comes there on a line within the step; one
+   * that goes farther than 40 mm is put there.
+   */
+  float place[3];
+  /**
+   * Tied to an instrument: its place in `upt_input.instruments`.
+   */
+  uint32_t instrument;
+  /**
+   * Tied to the tissue: the other point, as `nodes` and `weights`.
+   */
+  uint32_t other_nodes[3];
+  /**
+   * See `other_nodes`.
+   */
+  float other_weights[3];
+  /**
+   * N/m, which is mN/mm, at most 1000000; 0: it does not pull.
+   */
+  float stiffness;
+  /**
+   * It pulls where it is longer than this, mm.
+   */
+  float slack_mm;
+  /**
+   * N s/m, which is mN s/mm.
+   */
+  float damping;
+  /**
+   * It breaks under a larger tension at the end of a step, mN; 0: never. Where several would, those break first that are pulled hardest for what they bear.
+   */
+  float break_mn;
+  /**
+   * 1: it pushes where it is shorter than `slack_mm`, as a rod does; 0: it is a thread.
+   */
+  uint8_t pushes;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[3];
+} upt_tie;
+
+/**
  * The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
  * by itself.
  *
@@ -822,6 +905,15 @@ typedef struct upt_input {
    * At most 32.
    */
   uint64_t pressure_count;
+  /**
+   * `[tie_count]`: ties of the tissue, all with the same `struct_size`, beside instruments or alone. A tie's place in the array is its identity: pass every tie
+   * every time, in the same order. A broken one stays broken in its place until it has a stiffness of 0 there, the array ends before it, or the scene is reset.
+   */
+  const struct upt_tie *ties;
+  /**
+   * At most 256.
+   */
+  uint64_t tie_count;
   /**
    * Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.
    */
@@ -901,6 +993,90 @@ typedef struct upt_instrument_contact {
    */
   float force[3];
 } upt_instrument_contact;
+
+/**
+ * What a tie does at the end of a step; filled by `upt_scene_tie_readings`.
+ */
+typedef struct upt_tie_reading {
+  /**
+   * `sizeof(upt_tie_reading)`, set by the caller, the same in every element of an array.
+   */
+  uint32_t struct_size;
+  /**
+   * 1: it has broken, in this step or before.
+   */
+  uint8_t broken;
+  /**
+   * 1: it broke in this step.
+   */
+  uint8_t broke;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[2];
+  /**
+   * On the tissue at the tie's point, mN.
+   */
+  float force[3];
+  /**
+   * From end to end, mm.
+   */
+  float length_mm;
+} upt_tie_reading;
+
+/**
+ * A bed: what holds a region of the surface, for `upt_scene_bed`.
+ */
+typedef struct upt_bed {
+  /**
+   * `sizeof(upt_bed)`.
+   */
+  uint32_t struct_size;
+  /**
+   * mm: with no `nodes`, the region is what lies this close to `centre` in the last state.
+   */
+  float radius_mm;
+  /**
+   * mm, in the mesh's frame.
+   */
+  float centre[3];
+  /**
+   * From each node to where it is tied, mm; zeros: where it is in the last state.
+   */
+  float offset[3];
+  /**
+   * `[node_count]`: the nodes that it ties.
+   */
+  const uint32_t *nodes;
+  /**
+   * At most K; 0: those about `centre`.
+   */
+  uint64_t node_count;
+  /**
+   * Of all ties together, N/m.
+   */
+  float stiffness;
+  /**
+   * Of each tie, mm.
+   */
+  float slack_mm;
+  /**
+   * Of all ties together, N s/m.
+   */
+  float damping;
+  /**
+   * Of all ties together, mN; 0: it never breaks.
+   */
+  float break_mn;
+  /**
+   * As in `upt_tie`.
+   */
+  uint8_t pushes;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[7];
+} upt_bed;
 
 /**
  * What an operation has made of the body of a scene; filled by `upt_scene_cut` and the calls beside it.
@@ -1722,6 +1898,54 @@ upt_status upt_hull_create(const float *points,
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before).
  */
 upt_status upt_hull_destroy(struct upt_hull *hull);
+
+/**
+ * Copies what each tie of the last step does at its end.
+ *
+ * - `out`: `[count]`, in the order of the step's ties; set `struct_size` of every element.
+ * - `count`: ties of that step.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+ * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of ties.
+ */
+upt_status upt_scene_tie_readings(struct upt_scene *scene,
+                                  struct upt_tie_reading *out,
+                                  uint64_t count);
+
+/**
+ * Finds the points of the tissue nearest to places, for ties: of the domain, the surface that instruments may touch, where it is in the last state.
+ *
+ * - `places`: `[count,3]`, mm, in the mesh's frame.
+ * - `nodes`: `[count,3]`, `weights`: `[count,3]`: of each the nodes of a face and the weights of its corners, for `upt_tie`.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` for a bundle without a domain,
+ * `UPT_ERR_UNSUPPORTED` for a cut body and in a build without feature "instruments"; nothing is written then.
+ */
+upt_status upt_scene_tie_points(struct upt_scene *scene,
+                                const float *places,
+                                uint64_t count,
+                                uint32_t *nodes,
+                                float *weights);
+
+/**
+ * Makes a bed: a tie at each free node of the domain within a region, from where the node is in the last state. Pass them in every step; a bed tears node by node.
+ *
+ * - `bed`: its region, and what holds there altogether: stiffness, damping and break force are shared among the ties by the area of surface around each node.
+ * - `ties`: `[capacity]`, ascending by node; set `struct_size` of every element. NULL with capacity 0 only queries the size.
+ * - `needed`: number of ties, written whenever there is a bed.
+ *
+ * Threads: any, at any time, even while a step runs.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` for a region without such nodes or with more than
+ * 256, for a number that no tie can have, and if capacity is too small; `UPT_ERR_UNSUPPORTED` for a cut body and in a build without feature "instruments";
+ * `UPT_ERR_OUT_OF_MEMORY`.
+ */
+upt_status upt_scene_bed(struct upt_scene *scene,
+                         const struct upt_bed *bed,
+                         struct upt_tie *ties,
+                         uint64_t capacity,
+                         uint64_t *needed);
 
 /**
  * Cuts along the way of a blade's edge through the tissue as it is now. Elements that the blade touches become two, with copies of

@@ -88,8 +88,8 @@ pub mod scene;
 #[doc(hidden)]
 pub mod stats;
 
-pub use ::contact::{Shape, ShapeError};
-pub use contact::{ContactReport, MAX_TOOLS, Mode, Push, Tool, ToolReading};
+pub use ::contact::{End as TieEnd, Sample as TiePoint, Shape, ShapeError, Spring, Tie, Vector};
+pub use contact::{ContactReport, MAX_TIES, MAX_TOOLS, Mode, Push, TieReading, Tool, ToolReading};
 pub use error::{Error, Result};
 pub use library::{init, shutdown};
 pub use model::{Kind, Model, ModelInfo};
@@ -99,7 +99,7 @@ pub use options::{
     Precision, Provider, SHORTEST_STEP_S, SceneOptions, StepPath, UserStream,
 };
 pub use scene::{
-    Blade, Contact, Cut, CutSurface, Loads, MAX_PRESSURES, Pressure, Progress, Scene, StepInput,
+    Bed, Blade, Contact, Cut, CutSurface, Loads, MAX_PRESSURES, Pressure, Progress, Scene, StepInput,
     SupportPose, SurfaceUpdate, View,
 };
 pub use stats::{SceneStats, flag};

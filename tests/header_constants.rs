@@ -89,6 +89,10 @@ const CONSTANTS: &[(&str, i64, i64)] = constants! {
     UPT_SHAPE_SPHERE = 4,
     UPT_MODE_SLIDE = 0,
     UPT_MODE_GRASP = 1,
+    UPT_END_SUPPORT = 0,
+    UPT_END_WORLD = 1,
+    UPT_END_INSTRUMENT = 2,
+    UPT_END_TISSUE = 3,
     UPT_ABI_VERSION = 1,
 };
 

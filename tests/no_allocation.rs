@@ -73,7 +73,7 @@ fn tools_allocate_nothing() {
     }
 }
 
-/// A ball presses while gravity turns, the surface is under pressure and the support moves.
+/// A ball presses while gravity turns, the surface is under pressure, the support moves, and ties are drawn taut, slack and broken.
 fn loads_allocate_nothing() {
     let model = model("tiny-corrected");
     let scene = scene(&model, &plain());
@@ -83,6 +83,25 @@ fn loads_allocate_nothing() {
     let mut forces = vec![0.0; 3 * scene.node_count()];
     forces[3 * node] = 5.0;
     let domain = model.indices(IndexSet::DomainNodes);
+    let from = upt::Vector::from_slice(&at);
+    let tie = |node: u32, break_mn: f32| upt::Tie {
+        point: upt::TiePoint {
+            nodes: [node; 3],
+            weights: [1.0, 0.0, 0.0],
+        },
+        end: upt::TieEnd::World(from + upt::Vector::Z),
+        spring: upt::Spring {
+            stiffness: 10.0,
+            slack_mm: 1.0,
+            ..upt::Spring::default()
+        },
+        break_mn,
+    };
+    let ties = [
+        tie(node as u32, 0.0),
+        tie(domain[1], 2.0),
+        tie(domain[2], 0.0),
+    ];
     let turn = || {
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         for t in 0..20 {
@@ -107,6 +126,7 @@ fn loads_allocate_nothing() {
                     position: [0.0, 0.0, 2.0 * wave],
                     rotation: [0.0, 0.0, 0.0, 1.0],
                 }),
+                ties: &ties[..if t % 5 == 0 { 0 } else { 3 }],
                 ..upt::Loads::NONE
             };
             let tools = [tool];

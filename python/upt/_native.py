@@ -247,6 +247,19 @@ class Mode(IntEnum):
     or the grasp tears off."""
 
 
+class End(IntEnum):
+    """`UPT_END_*`."""
+
+    SUPPORT = 0
+    """A tie's far end is in the mesh's frame, which goes with the support."""
+    WORLD = 1
+    """A tie's far end is in the world, which is the mesh's frame where no support moves."""
+    INSTRUMENT = 2
+    """A tie's far end is on an instrument."""
+    TISSUE = 3
+    """A tie's far end is another point of the tissue: a suture."""
+
+
 class InitOptions(Record):
     """Options of `upt_init`."""
 
@@ -803,6 +816,11 @@ class Input(Record):
     """`[pressure_count]`: pressure on parts of the surface at the end of the step, all with the same `struct_size`."""
     pressure_count: int
     """At most 32."""
+    ties: int | None
+    """`[tie_count]`: ties of the tissue, all with the same `struct_size`, beside instruments or alone. A tie's place in the array is its identity: pass every tie
+    every time, in the same order. A broken one stays broken in its place until it has a stiffness of 0 there, the array ends before it, or the scene is reset."""
+    tie_count: int
+    """At most 256."""
     gravity: tuple[float, ...] = vector("_gravity")
     """Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction."""
     gravity_at_rest: tuple[float, ...] = vector("_gravity_at_rest")
@@ -830,6 +848,8 @@ class Input(Record):
         ("forces", ctypes.c_void_p),
         ("pressures", ctypes.c_void_p),
         ("pressure_count", ctypes.c_uint64),
+        ("ties", ctypes.c_void_p),
+        ("tie_count", ctypes.c_uint64),
         ("_gravity", ctypes.c_float * 3),
         ("_gravity_at_rest", ctypes.c_float * 3),
         ("_support_position", ctypes.c_float * 3),
@@ -855,6 +875,127 @@ class Pressure(Record):
         ("pascal", ctypes.c_float),
         ("nodes", ctypes.c_void_p),
         ("node_count", ctypes.c_uint64),
+    ]
+
+
+class Tie(Record):
+    """A tie: a spring between a point of the tissue and something else, an element of `upt_input.ties`."""
+
+    struct_size: int
+    """`sizeof(upt_tie)`, the same in every element of an array."""
+    to: End = choice("_to", End)
+    """What it is tied to: `UPT_END_*`."""
+    nodes: tuple[int, ...] = vector("_nodes")
+    """The point of the tissue: nodes, of which one at least is free and near the domain, ..."""
+    weights: tuple[float, ...] = vector("_weights")
+    """... and their weights, 0 or more, with the sum 1; all zero: the first node alone. `upt_scene_tie_points` finds both."""
+    place: tuple[float, ...] = vector("_place")
+    """Where its far end is at the end of the step, mm: in the mesh's frame, in the world, or in the instrument's frame. It comes there on a line within the step; one
+    that goes farther than 40 mm is put there."""
+    instrument: int
+    """Tied to an instrument: its place in `upt_input.instruments`."""
+    other_nodes: tuple[int, ...] = vector("_other_nodes")
+    """Tied to the tissue: the other point, as `nodes` and `weights`."""
+    other_weights: tuple[float, ...] = vector("_other_weights")
+    """See `other_nodes`."""
+    stiffness: float
+    """N/m, which is mN/mm, at most 1000000; 0: it does not pull."""
+    slack_mm: float
+    """It pulls where it is longer than this, mm."""
+    damping: float
+    """N s/m, which is mN s/mm."""
+    break_mn: float
+    """It breaks under a larger tension at the end of a step, mN; 0: never. Where several would, those break first that are pulled hardest for what they bear."""
+    pushes: bool = boolean("_pushes")
+    """1: it pushes where it is shorter than `slack_mm`, as a rod does; 0: it is a thread."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_to", ctypes.c_int32),
+        ("_nodes", ctypes.c_uint32 * 3),
+        ("_weights", ctypes.c_float * 3),
+        ("_place", ctypes.c_float * 3),
+        ("instrument", ctypes.c_uint32),
+        ("_other_nodes", ctypes.c_uint32 * 3),
+        ("_other_weights", ctypes.c_float * 3),
+        ("stiffness", ctypes.c_float),
+        ("slack_mm", ctypes.c_float),
+        ("damping", ctypes.c_float),
+        ("break_mn", ctypes.c_float),
+        ("_pushes", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 3),
+    ]
+
+
+class TieReading(Record):
+    """What a tie does at the end of a step; filled by `upt_scene_tie_readings`."""
+
+    struct_size: int
+    """`sizeof(upt_tie_reading)`, set by the caller, the same in every element of an array."""
+    broken: bool = boolean("_broken")
+    """1: it has broken, in this step or before."""
+    broke: bool = boolean("_broke")
+    """1: it broke in this step."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    force: tuple[float, ...] = vector("_force")
+    """On the tissue at the tie's point, mN."""
+    length_mm: float
+    """From end to end, mm."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_broken", ctypes.c_uint8),
+        ("_broke", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 2),
+        ("_force", ctypes.c_float * 3),
+        ("length_mm", ctypes.c_float),
+    ]
+
+
+class Bed(Record):
+    """A bed: what holds a region of the surface, for `upt_scene_bed`."""
+
+    struct_size: int
+    """`sizeof(upt_bed)`."""
+    radius_mm: float
+    """mm: with no `nodes`, the region is what lies this close to `centre` in the last state."""
+    centre: tuple[float, ...] = vector("_centre")
+    """mm, in the mesh's frame."""
+    offset: tuple[float, ...] = vector("_offset")
+    """From each node to where it is tied, mm; zeros: where it is in the last state."""
+    nodes: int | None
+    """`[node_count]`: the nodes that it ties."""
+    node_count: int
+    """At most K; 0: those about `centre`."""
+    stiffness: float
+    """Of all ties together, N/m."""
+    slack_mm: float
+    """Of each tie, mm."""
+    damping: float
+    """Of all ties together, N s/m."""
+    break_mn: float
+    """Of all ties together, mN; 0: it never breaks."""
+    pushes: int
+    """As in `upt_tie`."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("radius_mm", ctypes.c_float),
+        ("_centre", ctypes.c_float * 3),
+        ("_offset", ctypes.c_float * 3),
+        ("nodes", ctypes.c_void_p),
+        ("node_count", ctypes.c_uint64),
+        ("stiffness", ctypes.c_float),
+        ("slack_mm", ctypes.c_float),
+        ("damping", ctypes.c_float),
+        ("break_mn", ctypes.c_float),
+        ("pushes", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 7),
     ]
 
 
@@ -1085,6 +1226,9 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_instrument_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_scene_tie_readings": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_tie_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_scene_bed": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_cut": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_cut_with": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_remove": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_float, ctypes.c_void_p]),

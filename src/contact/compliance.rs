@@ -3,8 +3,9 @@
 //! With a coarse space, `A` is the compliance of `K + kappa M`: the static one less what inertia holds back,
 //! `A_k = A - N diag(kappa / (w² (w² + kappa))) N^T` with natural modes `N` of frequency `w`.
 
-use ::contact::{Sample, Samples, Vector};
+use ::contact::Vector;
 
+use super::ties::{Points, RowNodes};
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 use crate::prior::{CoarseSpace, PriorTable};
@@ -53,21 +54,20 @@ impl<'a> Compliance<'a> {
         }
     }
 
-    /// Columns of the nodes of a sample with their weights; nodes that do not move are left out.
-    pub fn entries(&self, sample: Sample) -> impl Iterator<Item = (u32, f32)> {
-        let columns = sample.nodes.into_iter().zip(sample.weights);
-        columns.filter_map(|(node, weight)| {
+    /// Columns of the nodes of a row with their weights; nodes that do not move are left out.
+    pub fn entries(&self, row: impl Into<RowNodes>) -> impl Iterator<Item = (u32, f32)> {
+        row.into().into_entries().filter_map(|(node, weight)| {
             let found = self.prior.column_for(self.held, node)?;
-            (weight != 0.0).then_some((found.0 as u32, weight))
+            Some((found.0 as u32, weight))
         })
     }
 }
 
-/// A sample's place among the columns, and its weight there, for up to three nodes.
+/// A row's place among the columns, and its weight there, for up to six nodes.
 #[derive(Clone, Copy, Debug, Default, HeldBytes)]
 struct Entries {
     count: usize,
-    places: [(u32, f32); 3],
+    places: [(u32, f32); 6],
 }
 
 /// `A` at some columns, and `W` of samples on them. From call to call only what is new is computed: each value is a function of its
@@ -101,6 +101,8 @@ pub struct Delassus {
     known: Vec<(u32, u32)>,
     /// By sample: its places among the columns.
     entries: Vec<Entries>,
+    /// Of which ties.
+    ties: u64,
 }
 
 const NONE: u32 = u32::MAX;
@@ -117,13 +119,13 @@ impl Delassus {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn of(
+    pub fn of<'p>(
         &mut self,
         compliance: Compliance<'_>,
-        all: &Samples,
+        all: impl Into<Points<'p>>,
         rows: &[u32],
     ) -> Result<&[f32]> {
-        self.read(compliance, all, rows)?;
+        self.read(compliance, all.into(), rows)?;
         Ok(&self.w)
     }
 
@@ -134,7 +136,7 @@ impl Delassus {
     pub fn fixed(
         &mut self,
         compliance: Compliance<'_>,
-        all: &Samples,
+        all: Points<'_>,
         rows: &[u32],
     ) -> Result<(&[f32], bool)> {
         let is_new = self.read(compliance, all, rows)?;
@@ -142,9 +144,15 @@ impl Delassus {
     }
 
     /// Makes `w` that of the samples; says whether it was another's.
-    fn read(&mut self, compliance: Compliance<'_>, all: &Samples, rows: &[u32]) -> Result<bool> {
+    fn read(&mut self, compliance: Compliance<'_>, all: Points<'_>, rows: &[u32]) -> Result<bool> {
+        if self.ties != all.generation {
+            // Rows of the same numbers are others.
+            self.of.clear();
+            self.w.clear();
+            self.ties = all.generation;
+        }
         self.wanted.clear();
-        memory::fit(&mut self.wanted, 3 * rows.len(), WHAT)?;
+        memory::fit(&mut self.wanted, 6 * rows.len(), WHAT)?;
         let samples = rows.iter().map(|row| all.at(*row));
         self.gather(compliance, samples.clone())?;
         if self.of == rows {
@@ -234,11 +242,11 @@ impl Delassus {
         }
     }
 
-    /// Reads the columns that samples need, unless they are there; `wanted` has room for three a sample.
+    /// Reads the columns that samples need, unless they are there; `wanted` has room for six a row.
     fn gather(
         &mut self,
         compliance: Compliance<'_>,
-        samples: impl Iterator<Item = Sample>,
+        samples: impl Iterator<Item = RowNodes>,
     ) -> Result<()> {
         for sample in samples {
             self.wanted

@@ -1,9 +1,10 @@
 //! `W` at any time after a step: the static one less what inertia holds back at that time, `W_k = W - G diag(lost) G^T` with the natural modes `G` at
 //! the samples. `W` and `G` are kept from call to call; a row is computed when it is asked for, by contacts whose force changes.
 
-use ::contact::{Rows, Samples};
+use ::contact::Rows;
 
 use super::compliance::{Compliance, Delassus, WHAT};
+use super::ties::Points;
 use crate::error::Result;
 use crate::kernels::Isa;
 use crate::kernels::respond::columns_f32;
@@ -41,7 +42,7 @@ impl InertialCompliance {
         &'a mut self,
         delassus: &'a mut Delassus,
         compliance: Compliance<'a>,
-        all: &Samples,
+        all: Points<'_>,
         rows: &[u32],
     ) -> Result<At<'a>> {
         let order = 3 * rows.len();
@@ -66,7 +67,7 @@ impl InertialCompliance {
     }
 
     /// The natural modes at the samples.
-    fn read(&mut self, compliance: Compliance<'_>, all: &Samples, rows: &[u32]) -> Result<()> {
+    fn read(&mut self, compliance: Compliance<'_>, all: Points<'_>, rows: &[u32]) -> Result<()> {
         self.modes.clear();
         let Some((space, lost)) = compliance.inertia else {
             return Ok(());
@@ -149,6 +150,7 @@ mod tests {
             held[node as usize] = true;
         }
         let samples = model.samples().unwrap();
+        let points = Points::from(&*samples);
         let count = samples.rows().len() as u32;
         let mut own = InertialCompliance::default();
         let mut between = Delassus::default();
@@ -158,8 +160,8 @@ mod tests {
             assert!(lost.iter().any(|lost| *lost > 0.0));
             let compliance = Compliance::at_rest(prior, &held, Some((space, &lost)));
             let mut whole = Delassus::default();
-            let wanted = whole.of(compliance, &samples, &rows).unwrap();
-            let mut at = own.at(&mut between, compliance, &samples, &rows).unwrap();
+            let wanted = whole.of(compliance, points, &rows).unwrap();
+            let mut at = own.at(&mut between, compliance, points, &rows).unwrap();
             assert_eq!(at.contacts(), rows.len());
             let size = 9 * rows.len();
             let largest = wanted.iter().fold(0.0f32, |most, w| most.max(w.abs()));

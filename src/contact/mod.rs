@@ -8,6 +8,7 @@
 //! | `buried` | tools that lie in the tissue, and their way out |
 //! | [`compliance`] | how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
 //! | `inertial_compliance` | the same at any time after a step |
+//! | [`ties`] | springs from the tissue to something else, rows beside those of tools |
 //! | [`state`] | where the tissue is, and where it was |
 //! | [`rows`] | gaps and slips of samples near the tools, at a state of the tissue |
 //! | [`problem`] | the samples near the tools, one solve for the forces on them, what the forces change, and what tools are told |
@@ -22,6 +23,7 @@ pub mod problem;
 pub mod rows;
 pub mod state;
 mod stored;
+pub mod ties;
 pub mod tool;
 
 pub(crate) use compliance::Delassus;
@@ -31,4 +33,5 @@ pub use problem::ContactProblem;
 pub(crate) use rows::{Pair, outward};
 pub use state::State;
 pub(crate) use state::vector;
-pub use tool::{ContactReport, MAX_TOOLS, Mode, PUT_MM, Push, Tool, ToolReading};
+pub use ties::{HeldTie, MAX_TIES, Placed, Points};
+pub use tool::{ContactReport, MAX_TOOLS, Mode, PUT_MM, Push, TieReading, Tool, ToolReading};

@@ -1,11 +1,12 @@
 //! What contact remembers from step to step: where the tools were, with which force each sample was pushed, what is grasped.
 
 use ::contact::grasp::Anchor;
-use ::contact::{Grasp, Pose, Samples, Vector};
+use ::contact::{End, Grasp, Pose, Samples, Vector};
 
 use serde::{Deserialize, Serialize};
 
 use super::stored;
+use super::ties::{HeldTie, MAX_TIES, NO_TOOL, row_of, tie_of};
 use super::tool::{MAX_TOOLS, ToolReading};
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
@@ -15,9 +16,9 @@ const WHAT: &str = "the forces of instruments";
 /// The force on one sample, mN.
 #[derive(Clone, Copy, Debug, PartialEq, HeldBytes, Serialize, Deserialize)]
 pub struct Force {
-    /// Place in the list of tools.
+    /// Place in the list of tools; of a tie none ([`NO_TOOL`]).
     pub tool: u32,
-    /// Row of the samples.
+    /// Row of the samples, or of a tie.
     pub sample: u32,
     /// On the tissue.
     #[serde(with = "stored::vector")]
@@ -25,6 +26,12 @@ pub struct Force {
 }
 
 impl Force {
+    /// That of a tie among forces.
+    pub fn of_tie(forces: &[Force], index: usize) -> Vector {
+        let found = forces.binary_search_by_key(&(NO_TOOL, row_of(index)), Force::key);
+        found.map_or(Vector::ZERO, |at| forces[at].force)
+    }
+
     /// What forces are sorted by.
     pub fn key(&self) -> (u32, u32) {
         (self.tool, self.sample)
@@ -54,6 +61,8 @@ pub struct Past {
     pub tools: Vec<Held>,
     /// Forces that are not zero, ascending by [`Force::key`].
     pub forces: Vec<Force>,
+    /// One a tie, in the host's order.
+    pub ties: Vec<HeldTie>,
 }
 
 impl Past {
@@ -65,20 +74,25 @@ impl Past {
         Ok(Past {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             forces: memory::room(samples, WHAT)?,
+            ties: Vec::new(),
         })
     }
 
-    /// Checks what was read against the samples of the surface.
+    /// Checks what was read against the samples of the surface of a body of so many nodes.
     ///
     /// # Errors
     /// [`Error::Snapshot`].
-    pub fn check(&self, samples: &Samples) -> Result<()> {
+    pub fn check(&self, samples: &Samples, node_count: usize) -> Result<()> {
         let bad = |what: &str| {
             Err(Error::Snapshot(format!(
                 "holds {what} that no scene can have"
             )))
         };
-        let Past { tools, forces } = self;
+        let Past {
+            tools,
+            forces,
+            ties,
+        } = self;
         if tools.len() > MAX_TOOLS {
             return bad("a number of instruments");
         }
@@ -105,10 +119,26 @@ impl Past {
         }
         let ascends = forces.is_sorted_by(|a, b| a.key() < b.key());
         let known = |one: &Force| {
-            (one.tool as usize) < tools.len() && samples.is_row(one.sample) && one.force.is_finite()
+            let is_row = match tie_of(one.sample) {
+                Some(index) => one.tool == NO_TOOL && index < ties.len(),
+                None => (one.tool as usize) < tools.len() && samples.is_row(one.sample),
+            };
+            is_row && one.force.is_finite()
         };
         if !ascends || !forces.iter().all(known) {
             return bad("a force");
+        }
+        let is_sound = |HeldTie { placed, .. }: &HeldTie| {
+            let far = match placed.tie.end {
+                End::Tissue(far) => far.nodes,
+                _ => placed.tie.point.nodes,
+            };
+            let mut nodes = placed.tie.point.nodes.into_iter().chain(far);
+            let is_known = nodes.all(|node| (node as usize) < node_count);
+            is_known && placed.place.is_finite() && placed.tie.check().is_ok()
+        };
+        if ties.len() > MAX_TIES || !ties.iter().all(is_sound) {
+            return bad("a tie");
         }
         Ok(())
     }
@@ -127,6 +157,7 @@ impl Past {
             own.reading = other.reading;
             memory::tried(own.grasp.take(&other.grasp), WHAT)?;
         }
+        memory::replace(&mut self.ties, &other.ties, WHAT)?;
         memory::replace(&mut self.forces, &other.forces, WHAT)
     }
 
@@ -140,9 +171,15 @@ impl Past {
         Ok(copy)
     }
 
-    /// No tool.
+    /// Whether there is no tool and no tie.
+    pub fn is_empty(&self) -> bool {
+        self.tools.is_empty() && self.ties.is_empty()
+    }
+
+    /// No tool and no tie.
     pub fn clear(&mut self) {
         self.tools.clear();
+        self.ties.clear();
         self.forces.clear();
     }
 }

@@ -5,6 +5,7 @@ use ::contact::{Body, Contact, Law, Pose, Samples, Vector, pose};
 use super::buried::Buried;
 use super::past::Held;
 use super::state::State;
+use super::ties::{Placed, Pulling, tie_of};
 use super::tool::Tool;
 use crate::memory::HeldBytes;
 
@@ -209,11 +210,19 @@ pub(super) struct Moving<'a> {
     pub state: State<'a>,
     /// The part of their way that they have gone.
     pub part: f32,
+    pub pulling: Pulling<'a>,
 }
 
 impl Moving<'_> {
     /// Gap and slip of a row at its point. What lay deep inside of the tool when the step began may stay so, but for [`RECOVERY_MM`].
     pub(super) fn measure(&self, row: &Row) -> Contact {
+        if let Some(index) = tie_of(row.sample) {
+            let tie = self.pulling.ties.get(index).map(Placed::row);
+            let start = tie.unwrap_or_default();
+            let start = start.gather(|node| self.state.position_before(node));
+            let contact = self.pulling.contact(index, row.point, start, self.part);
+            return contact.unwrap_or(RELEASED);
+        }
         let mut contact = self.contact(row, self.part);
         if contact.gap < 0.0 {
             let sample = self.samples.at(row.sample);

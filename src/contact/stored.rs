@@ -1,4 +1,4 @@
-//! Vectors, poses and grasps in a snapshot.
+//! Vectors, poses, grasps and ties in a snapshot.
 
 /// Three numbers.
 pub mod vector {
@@ -49,5 +49,72 @@ pub mod grasp {
         let mut grasp = Grasp::default();
         grasp.restore(anchors.map(anchor).collect());
         Ok(grasp)
+    }
+}
+
+/// Point, far end, spring and strength.
+pub mod tie {
+    use ::contact::{End, Sample, Spring, Tie, Vector};
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    type Point = ([u32; 3], [f32; 3]);
+
+    #[derive(Serialize, Deserialize)]
+    enum Far {
+        World([f32; 3]),
+        Support([f32; 3]),
+        Tool(u32, [f32; 3]),
+        Tissue(Point),
+    }
+
+    fn taken(sample: &Sample) -> Point {
+        (sample.nodes, sample.weights)
+    }
+
+    fn given((nodes, weights): Point) -> Sample {
+        Sample { nodes, weights }
+    }
+
+    pub fn serialize<S: Serializer>(tie: &Tie, serializer: S) -> Result<S::Ok, S::Error> {
+        let far = match tie.end {
+            End::World(place) => Far::World(place.to_array()),
+            End::Support(place) => Far::Support(place.to_array()),
+            End::Tool { tool, place } => Far::Tool(tool, place.to_array()),
+            End::Tissue(sample) => Far::Tissue(taken(&sample)),
+        };
+        let Spring {
+            stiffness,
+            slack_mm,
+            damping,
+            pushes,
+        } = tie.spring;
+        let numbers = [stiffness, slack_mm, damping, tie.break_mn];
+        (taken(&tie.point), far, numbers, pushes).serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Tie, D::Error> {
+        let (point, far, numbers, pushes) =
+            <(Point, Far, [f32; 4], bool)>::deserialize(deserializer)?;
+        let [stiffness, slack_mm, damping, break_mn] = numbers;
+        let end = match far {
+            Far::World(place) => End::World(Vector::from(place)),
+            Far::Support(place) => End::Support(Vector::from(place)),
+            Far::Tool(tool, place) => End::Tool {
+                tool,
+                place: Vector::from(place),
+            },
+            Far::Tissue(point) => End::Tissue(given(point)),
+        };
+        Ok(Tie {
+            point: given(point),
+            end,
+            spring: Spring {
+                stiffness,
+                slack_mm,
+                damping,
+                pushes,
+            },
+            break_mn,
+        })
     }
 }

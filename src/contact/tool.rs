@@ -142,6 +142,19 @@ pub struct Push {
     pub force: [f32; 3],
 }
 
+/// What a tie does at the end of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, HeldBytes)]
+pub struct TieReading {
+    /// On the tissue at the tie's point, mN.
+    pub force: [f32; 3],
+    /// From end to end, mm.
+    pub length_mm: f32,
+    /// It has broken, in this step or before.
+    pub broken: bool,
+    /// In this step.
+    pub broke: bool,
+}
+
 /// What each tool of the last step feels, and the samples that push it.
 #[derive(Clone, Debug, Default)]
 pub struct ContactReport {
@@ -149,22 +162,26 @@ pub struct ContactReport {
     pub readings: Vec<ToolReading>,
     /// Ascending by tool.
     pub pushes: Vec<Push>,
+    /// One a tie.
+    pub ties: Vec<TieReading>,
 }
 
 impl ContactReport {
-    /// Room for the readings of `tools` tools and for `pushes` samples.
+    /// Room for the readings of `tools` tools and `ties` ties and for `pushes` samples.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn fit(&mut self, tools: usize, pushes: usize) -> Result<()> {
+    pub fn fit(&mut self, tools: usize, ties: usize, pushes: usize) -> Result<()> {
         const WHAT: &str = "the readings of instruments";
         memory::fit(&mut self.readings, tools, WHAT)?;
+        memory::fit(&mut self.ties, ties, WHAT)?;
         memory::fit(&mut self.pushes, pushes, WHAT)
     }
 
-    /// No tools.
+    /// No tools and no ties.
     pub fn clear(&mut self) {
         self.readings.clear();
+        self.ties.clear();
         self.pushes.clear();
     }
 }

@@ -1,12 +1,12 @@
 //! A step that tools drive, made of shorter ones: where one of the scene's length leaves out more than the target allows, no iteration brings
 //! that back, and a tool on the verge of slipping takes another way.
 
-use ::contact::{Pose, pose};
+use ::contact::{Pose, Vector, pose};
 
 use super::input::{Enough, Input, Report, SolverContext};
 use super::solver::{ImplicitSolver, SMALLEST_DET};
 use super::substepper::Substepper;
-use crate::contact::{ContactProblem, Delassus, MAX_TOOLS, Past, Tool};
+use crate::contact::{ContactProblem, Delassus, MAX_TIES, MAX_TOOLS, Past, Placed, Tool};
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
@@ -26,6 +26,11 @@ pub struct Substeps {
     from: Vec<Pose>,
     on_their_way: Vec<Tool>,
     torn: [bool; MAX_TOOLS],
+    /// The same of the ties and their far ends.
+    ties: Vec<Placed>,
+    tied_from: Vec<Vector>,
+    tied: Vec<Placed>,
+    broke: [bool; MAX_TIES],
 }
 
 impl Substeps {
@@ -42,6 +47,10 @@ impl Substeps {
             from: memory::room(MAX_TOOLS, WHAT)?,
             on_their_way: memory::room(MAX_TOOLS, WHAT)?,
             torn: [false; MAX_TOOLS],
+            ties: Vec::new(),
+            tied_from: Vec::new(),
+            tied: Vec::new(),
+            broke: [false; MAX_TIES],
         })
     }
 
@@ -101,6 +110,9 @@ impl ImplicitSolver {
         substeps.tools.extend_from_slice(problem.tools());
         substeps.from.clear();
         substeps.from.extend_from_slice(problem.before());
+        memory::replace(&mut substeps.ties, problem.ties(), WHAT)?;
+        memory::replace(&mut substeps.tied_from, problem.tied_from(), WHAT)?;
+        memory::fit(&mut substeps.tied, substeps.ties.len(), WHAT)?;
         self.exchange(substepper);
         problem.exchange(&mut substeps.responses);
         let result = self.each_substep(context, input, problem, (substeps, substepper));
@@ -126,12 +138,17 @@ impl ImplicitSolver {
             from,
             on_their_way,
             torn,
+            ties,
+            tied_from,
+            tied,
+            broke,
             ..
         } = substeps;
         let count = substepper.count();
         let mut told = Report::default();
         let mut lost = false;
         torn.fill(false);
+        broke.fill(false);
         self.clear_pairs();
         for part in 1..=count {
             let way = part as f32 / count as f32;
@@ -140,6 +157,11 @@ impl ImplicitSolver {
             for (tool, from) in on_their_way.iter_mut().zip(&*from) {
                 tool.pose = pose::between(from, &tool.pose, way);
             }
+            tied.clear();
+            tied.extend_from_slice(ties);
+            for (tied, from) in tied.iter_mut().zip(&*tied_from) {
+                tied.place = *from + (tied.place - *from) * way;
+            }
             let Substepper {
                 time_step,
                 last,
@@ -147,7 +169,7 @@ impl ImplicitSolver {
                 next,
                 ..
             } = &mut *substepper;
-            problem.enter(on_their_way, input.rest, last)?;
+            problem.enter(on_their_way, tied, input.rest, last)?;
             let short = SolverContext {
                 time_step,
                 ..context
@@ -168,6 +190,10 @@ impl ImplicitSolver {
             for (torn, held) in torn.iter_mut().zip(&mut problem.next.tools) {
                 *torn |= held.reading.torn;
                 held.reading.torn = *torn;
+            }
+            for (broke, held) in broke.iter_mut().zip(&mut problem.next.ties) {
+                *broke |= held.reading.broke;
+                held.reading.broke = *broke;
             }
             std::mem::swap(&mut self.motion, &mut self.next);
             if part < count {

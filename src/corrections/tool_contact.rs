@@ -37,6 +37,8 @@ const MORE_PRESSES: u32 = 6;
 const MORE_EVALUATIONS: u32 = 6;
 const EVALUATIONS: u32 = 2;
 
+/// How often a step is made again because ties break; what is pulled too hard then breaks in the next.
+const MOST_BREAKS: u32 = 6;
 /// Parts of the tools' way after which a guess that inverts elements is improved by an iteration, at most.
 const MOST_PARTS: u32 = 4;
 
@@ -63,7 +65,8 @@ impl ImplicitSolver {
         self.make_loaded(context, input, problem, next, true)
     }
 
-    /// The same with the pairs of the last published state, or with those that there are; once more where a grasp tears off, which then holds nothing at the end.
+    /// The same with the pairs of the last published state, or with those that there are; once more where a grasp tears off, which then holds nothing at the end,
+    /// and where ties break.
     pub(super) fn make_loaded(
         &mut self,
         context: SolverContext<'_>,
@@ -73,23 +76,30 @@ impl ImplicitSolver {
         from_published: bool,
     ) -> Result<Report> {
         let _awake = context.pool.keep_awake();
-        let mut made = |problem: &mut ContactProblem| {
+        let mut made = |problem: &mut ContactProblem, breaks: bool| -> Result<Report> {
             if from_published {
                 self.begin_pairs();
             }
             let report = self.balance_loaded(context, input, problem, next)?;
-            problem.finish(State {
+            let state = State {
                 rest: input.rest,
                 u: next,
                 start: input.last,
-            });
+            };
+            problem.finish_with(state, breaks);
             Ok(report)
         };
-        let report = made(problem)?;
-        match problem.tears() {
-            true => made(problem),
-            false => Ok(report),
+        let mut report = made(problem, true)?;
+        if problem.tears() {
+            report = made(problem, true)?;
         }
+        // Each time those break that bear least of what they are pulled with.
+        let mut left = MOST_BREAKS;
+        while problem.has_broken() {
+            left -= 1;
+            report = made(problem, left > 0)?;
+        }
+        Ok(report)
     }
 
     fn balance_loaded(
@@ -100,6 +110,7 @@ impl ImplicitSolver {
         next: &mut [f32],
     ) -> Result<Report> {
         self.nodes.clear();
+        problem.take_length(context.time_step.integrator.step_s as f32);
         self.memory.mask(&[]);
         (self.preconditioner).expect_load(context.env(), input.load.is_some())?;
         self.prepare(context, input)?;

@@ -138,6 +138,15 @@ pub const UPT_MODE_SLIDE: u8 = 0;
 /// or the grasp tears off.
 pub const UPT_MODE_GRASP: u8 = 1;
 
+/// A tie's far end is in the mesh's frame, which goes with the support.
+pub const UPT_END_SUPPORT: i32 = 0;
+/// A tie's far end is in the world, which is the mesh's frame where no support moves.
+pub const UPT_END_WORLD: i32 = 1;
+/// A tie's far end is on an instrument.
+pub const UPT_END_INSTRUMENT: i32 = 2;
+/// A tie's far end is another point of the tissue: a suture.
+pub const UPT_END_TISSUE: i32 = 3;
+
 /// The library's own values are these; a difference does not compile.
 const _: () = {
     use crate::model::Kind;

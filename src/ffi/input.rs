@@ -5,18 +5,22 @@ use super::convert;
 use super::failure::{Failure, fail};
 use super::pointers::{each, options, slice};
 use super::step_structs::*;
-use crate::contact::{MAX_TOOLS, Tool};
+use super::ties::taken;
+use crate::contact::{MAX_TIES, MAX_TOOLS, Tool};
 use crate::features;
-use crate::scene::{Contact, Loads, MAX_PRESSURES, Pressure, Scene, StepInput, SupportPose, View};
+use crate::scene::{
+    Contact, Lists, Loads, MAX_PRESSURES, Pressure, Scene, StepInput, SupportPose, View,
+};
+use ::contact::Tie;
 
-/// The host's input; its instruments and pressures are read into lists, its arrays stay where they are.
+/// The host's input; its instruments, ties and pressures are read into lists, its arrays stay where they are.
 ///
 /// # Safety
 /// NULL, or a struct whose first field is its size; its pointers lead to as many elements as the header says.
 pub(super) unsafe fn read_input<'a>(
     scene: &Scene,
     raw: *const upt_input,
-    tools: &'a mut Vec<Tool>,
+    Lists { tools, ties }: &'a mut Lists,
     pressures: &'a mut [Pressure<'static>; MAX_PRESSURES],
 ) -> Result<StepInput<'a>, Failure> {
     // SAFETY: the caller's.
@@ -63,7 +67,7 @@ pub(super) unsafe fn read_input<'a>(
         displacement: unsafe { field(scene, raw.displacement, "input.displacement") }?,
         contact,
         // SAFETY: the caller's.
-        loads: unsafe { read_loads(scene, &raw, pressures) }?,
+        loads: unsafe { read_loads(scene, &raw, pressures, ties) }?,
         time_s: raw.time_s,
     })
 }
@@ -76,7 +80,28 @@ unsafe fn read_loads<'a>(
     scene: &Scene,
     raw: &upt_input,
     pressures: &'a mut [Pressure<'static>; MAX_PRESSURES],
+    ties: &'a mut Vec<Tie>,
 ) -> Result<Loads<'a>, Failure> {
+    if raw.tie_count != 0 {
+        features::instruments()?;
+    }
+    if raw.tie_count > MAX_TIES as u64 {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!(
+                "input.tie_count is {}, must be at most {MAX_TIES}",
+                raw.tie_count
+            ),
+        );
+    }
+    ties.clear();
+    crate::memory::fit(ties, raw.tie_count as usize, "the ties")?;
+    let read_tie = |index: usize, one: upt_tie| {
+        ties.push(taken(index, &one)?);
+        Ok(())
+    };
+    // SAFETY: the caller's.
+    unsafe { each(raw.ties, raw.tie_count, "input.ties", read_tie) }?;
     if raw.pressure_count > MAX_PRESSURES as u64 {
         return fail(
             UPT_ERR_ARGUMENT,
@@ -104,6 +129,7 @@ unsafe fn read_loads<'a>(
         // SAFETY: the caller's.
         forces: unsafe { field(scene, raw.forces, "input.forces") }?,
         pressures: &pressures[..raw.pressure_count as usize],
+        ties,
         support: (raw.support_rotation != [0.0; 4] || raw.support_position != [0.0; 3]).then_some(
             SupportPose {
                 position: raw.support_position,

@@ -31,6 +31,7 @@ mod state;
 mod step_structs;
 mod structs;
 mod surface;
+mod ties;
 mod worker;
 
 #[cfg(feature = "fault")]
@@ -51,4 +52,5 @@ pub use state::*;
 pub use step_structs::*;
 pub use structs::*;
 pub use surface::*;
+pub use ties::*;
 pub use worker::*;

@@ -39,6 +39,9 @@ sized!(
     upt_scene_stats,
     upt_input,
     upt_pressure,
+    upt_tie,
+    upt_tie_reading,
+    upt_bed,
     upt_view
 );
 

@@ -41,10 +41,10 @@ pub unsafe extern "C" fn upt_scene_present(
 ) -> upt_status {
     call_scene("upt_scene_present", scene, |scene| {
         features::instruments()?;
-        let mut tools = scene.frame_tools()?;
+        let mut lists = scene.frame_lists()?;
         let mut pressures = Default::default();
         // SAFETY: the host passes what the header asks for.
-        let input = unsafe { read_input(scene, input, &mut tools, &mut pressures) }?;
+        let input = unsafe { read_input(scene, input, &mut lists, &mut pressures) }?;
         // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
         let view = unsafe { read_view(view) }?;
         // SAFETY: the host passes room for that many elements, as the header asks.

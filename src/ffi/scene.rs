@@ -98,10 +98,10 @@ pub unsafe extern "C" fn upt_scene_step(
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_step", scene, |scene| {
-        let mut tools = scene.tool_list()?;
+        let mut lists = scene.lists()?;
         let mut pressures = Default::default();
         // SAFETY: the host passes what the header asks for.
-        let input = unsafe { read_input(scene, input, &mut tools, &mut pressures) }?;
+        let input = unsafe { read_input(scene, input, &mut lists, &mut pressures) }?;
         // SAFETY: the host passes `out_count` floats of room, as the header asks.
         unsafe { step(scene, input, out, out_count) }
     })

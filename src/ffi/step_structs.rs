@@ -42,6 +42,11 @@ pub struct upt_input {
     pub pressures: *const upt_pressure,
     /// At most 32.
     pub pressure_count: u64,
+    /// `[tie_count]`: ties of the tissue, all with the same `struct_size`, beside instruments or alone. A tie's place in the array is its identity: pass every tie
+    /// every time, in the same order. A broken one stays broken in its place until it has a stiffness of 0 there, the array ends before it, or the scene is reset.
+    pub ties: *const upt_tie,
+    /// At most 256.
+    pub tie_count: u64,
     /// Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.
     pub gravity: [f32; 3],
     /// Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.
@@ -73,6 +78,8 @@ impl upt_input {
         forces: null(),
         pressures: null(),
         pressure_count: 0,
+        ties: null(),
+        tie_count: 0,
         gravity: [0.0; 3],
         gravity_at_rest: [0.0; 3],
         support_position: [0.0; 3],
@@ -114,6 +121,113 @@ pub struct upt_pressure {
     pub nodes: *const u32,
     /// At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare.
     pub node_count: u64,
+}
+
+/// A tie: a spring between a point of the tissue and something else, an element of `upt_input.ties`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_tie {
+    /// `sizeof(upt_tie)`, the same in every element of an array.
+    pub struct_size: u32,
+    /// What it is tied to: `UPT_END_*`.
+    pub to: i32,
+    /// The point of the tissue: nodes, of which one at least is free and near the domain, ...
+    pub nodes: [u32; 3],
+    /// ... and their weights, 0 or more, with the sum 1; all zero: the first node alone. `upt_scene_tie_points` finds both.
+    pub weights: [f32; 3],
+    /// Where its far end is at the end of the step, mm: in the mesh's frame, in the world, or in the instrument's frame. It comes there on a line within the step; one
+    /// that goes farther than 40 mm is put there.
+    pub place: [f32; 3],
+    /// Tied to an instrument: its place in `upt_input.instruments`.
+    pub instrument: u32,
+    /// Tied to the tissue: the other point, as `nodes` and `weights`.
+    pub other_nodes: [u32; 3],
+    /// See `other_nodes`.
+    pub other_weights: [f32; 3],
+    /// N/m, which is mN/mm, at most 1000000; 0: it does not pull.
+    pub stiffness: f32,
+    /// It pulls where it is longer than this, mm.
+    pub slack_mm: f32,
+    /// N s/m, which is mN s/mm.
+    pub damping: f32,
+    /// It breaks under a larger tension at the end of a step, mN; 0: never. Where several would, those break first that are pulled hardest for what they bear.
+    pub break_mn: f32,
+    /// 1: it pushes where it is shorter than `slack_mm`, as a rod does; 0: it is a thread.
+    pub pushes: u8,
+    /// Zero.
+    pub reserved: [u8; 3],
+}
+
+/// For hosts in Rust.
+impl upt_tie {
+    /// It does not pull.
+    pub const NONE: upt_tie = upt_tie {
+        struct_size: size_of::<upt_tie>() as u32,
+        to: super::constants::UPT_END_SUPPORT,
+        nodes: [0; 3],
+        weights: [1.0, 0.0, 0.0],
+        place: [0.0; 3],
+        instrument: 0,
+        other_nodes: [0; 3],
+        other_weights: [1.0, 0.0, 0.0],
+        stiffness: 0.0,
+        slack_mm: 0.0,
+        damping: 0.0,
+        break_mn: 0.0,
+        pushes: 0,
+        reserved: [0; 3],
+    };
+}
+
+/// What a tie does at the end of a step; filled by `upt_scene_tie_readings`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_tie_reading {
+    /// `sizeof(upt_tie_reading)`, set by the caller, the same in every element of an array.
+    pub struct_size: u32,
+    /// 1: it has broken, in this step or before.
+    pub broken: u8,
+    /// 1: it broke in this step.
+    pub broke: u8,
+    /// Zero.
+    pub reserved: [u8; 2],
+    /// On the tissue at the tie's point, mN.
+    pub force: [f32; 3],
+    /// From end to end, mm.
+    pub length_mm: f32,
+}
+
+/// A bed: what holds a region of the surface, for `upt_scene_bed`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_bed {
+    /// `sizeof(upt_bed)`.
+    pub struct_size: u32,
+    /// mm: with no `nodes`, the region is what lies this close to `centre` in the last state.
+    pub radius_mm: f32,
+    /// mm, in the mesh's frame.
+    pub centre: [f32; 3],
+    /// From each node to where it is tied, mm; zeros: where it is in the last state.
+    pub offset: [f32; 3],
+    /// `[node_count]`: the nodes that it ties.
+    pub nodes: *const u32,
+    /// At most K; 0: those about `centre`.
+    pub node_count: u64,
+    /// Of all ties together, N/m.
+    pub stiffness: f32,
+    /// Of each tie, mm.
+    pub slack_mm: f32,
+    /// Of all ties together, N s/m.
+    pub damping: f32,
+    /// Of all ties together, mN; 0: it never breaks.
+    pub break_mn: f32,
+    /// As in `upt_tie`.
+    pub pushes: u8,
+    /// Zero.
+    pub reserved: [u8; 7],
 }
 
 /// What is shown of a state. Where a call takes one, NULL is the region.

@@ -28,10 +28,10 @@ pub unsafe extern "C" fn upt_scene_submit(
     input: *const upt_input,
 ) -> upt_status {
     call_scene("upt_scene_submit", scene, |scene| {
-        let mut tools = scene.tool_list()?;
+        let mut lists = scene.lists()?;
         let mut pressures = Default::default();
         // SAFETY: the host passes what the header asks for.
-        scene.submit(unsafe { read_input(scene, input, &mut tools, &mut pressures) }?)?;
+        scene.submit(unsafe { read_input(scene, input, &mut lists, &mut pressures) }?)?;
         Ok(UPT_OK)
     })
 }

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use crate::clock::Instant;
 
-use ::contact::{Candidate, Contact, Grasp, Pose, Search, Sweeps, Vector};
+use ::contact::{Candidate, Contact, Grasp, Pose, Search, Sweeps, Tie, Vector};
 use half::{bf16, f16};
 
 pub(crate) use ::held::HeldBytes;
@@ -37,7 +37,7 @@ macro_rules! plain {
 
 plain!(bool, u8, u16, u32, u64, usize, i32, f16, bf16, f32, f64);
 plain!(Duration, Instant, lanes::Isa, std::ops::Range<usize>);
-plain!(Candidate, Contact, Grasp, Pose, Vector);
+plain!(Candidate, Contact, Grasp, Pose, Tie, Vector);
 
 /// A type of another crate that says itself what it holds.
 macro_rules! told {

@@ -1,11 +1,13 @@
-//! A copy of a host's loads.
+//! A copy of a host's loads and ties, for a step that is submitted.
+
+use ::contact::Tie;
 
 use super::loads::{Loads, MAX_PRESSURES, Pressure, WHAT};
 use super::support::SupportPose;
 use crate::error::Result;
 use crate::memory;
 
-/// A copy of a host's loads, for a step that is submitted.
+/// See the module.
 #[derive(Default)]
 pub(super) struct CopiedLoads {
     gravity: [f32; 3],
@@ -17,6 +19,7 @@ pub(super) struct CopiedLoads {
     nodes: Vec<u32>,
     /// How many of them each pressure has, and its size, Pa.
     pressures: Vec<(usize, f32)>,
+    ties: Vec<Tie>,
 }
 
 impl CopiedLoads {
@@ -27,6 +30,7 @@ impl CopiedLoads {
         memory::fit(&mut self.forces, forces.len(), WHAT)?;
         memory::fit(&mut self.nodes, nodes.sum(), WHAT)?;
         memory::fit(&mut self.pressures, loads.pressures.len(), WHAT)?;
+        memory::replace(&mut self.ties, loads.ties, WHAT)?;
         self.gravity = loads.gravity;
         self.gravity_at_rest = loads.gravity_at_rest;
         self.support = loads.support;
@@ -58,6 +62,7 @@ impl CopiedLoads {
             forces: self.has_forces.then_some(&*self.forces),
             pressures: &pressures[..self.pressures.len()],
             support: self.support,
+            ties: &self.ties,
         })
     }
 }

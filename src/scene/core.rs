@@ -16,7 +16,7 @@ use super::points::AttachedPoints;
 use super::published::{Frame, Published, View};
 use super::timing::Stopwatch;
 use crate::bundle::Mesh;
-use crate::contact::ContactProblem;
+use crate::contact::{ContactProblem, Placed};
 use crate::envelope::{EnvelopeCheck, ToolUse};
 use crate::error::Result;
 use crate::features::{Instruments, Proven};
@@ -51,6 +51,8 @@ pub struct Core {
     pub(super) problem: Option<Proven<Instruments, ContactProblem>>,
     /// From the first step that has loads.
     pub(super) loads: Option<Box<LoadState>>,
+    /// Of the step being made.
+    pub(super) placed_ties: Vec<Placed>,
     /// Whether loads act in the step being made, or did and the body has not come back from where they took it.
     pub(super) loaded: bool,
     /// The tools of the step being made, where the bundle's limits for tools say something about it.
@@ -155,6 +157,7 @@ impl Core {
             cut: None,
             problem: None,
             loads: None,
+            placed_ties: Vec::new(),
             loaded: false,
             used: None,
             hands: Vec::new(),
@@ -233,6 +236,7 @@ impl Core {
         let has_load = self.take_loads(published, &input.loads)?;
         stats.check_ms = watch.lap();
         let near = self.update_tools(published, &input)?;
+        let has_load = has_load || !input.loads.ties.is_empty();
         self.loaded = has_load || (self.counters.loaded && self.is_swung());
 
         if self.counters.sleeping

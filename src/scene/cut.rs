@@ -72,6 +72,9 @@ impl Core {
         if input.loads.support.is_some() {
             return self.check_intact("a step with a support that moves");
         }
+        if !input.loads.ties.is_empty() {
+            return self.check_intact("a step with ties");
+        }
         match input.displacement {
             Some(_) => self.check_intact("a step from a displacement"),
             None => Ok(()),
@@ -87,6 +90,12 @@ impl Core {
         if self.corrected.is_none() {
             return Err(Error::Unsupported(
                 "cut: the elements move a cut body, and this scene makes no corrections; set `corrections`".into(),
+            ));
+        }
+        let ties = self.problem.as_ref().map(|problem| &problem.past.ties);
+        if ties.is_some_and(|ties| !ties.is_empty()) {
+            return Err(Error::Unsupported(
+                "cut: a body with ties cannot be cut; make a step without them first".into(),
             ));
         }
         if self.loads.as_ref().is_some_and(|loads| loads.carried()) {

@@ -24,7 +24,7 @@ const DEEP_MM: f32 = 1.0;
 const UNSOLVED_MM: f32 = 0.01;
 
 impl Core {
-    /// Takes the tools of a step; says whether one is near enough to touch the tissue.
+    /// Takes the tools and ties of a step; says whether one is near enough to touch the tissue, or there are ties.
     pub(super) fn update_tools(
         &mut self,
         published: &RwLock<Published>,
@@ -35,10 +35,11 @@ impl Core {
             Contact::None => self.counters.driven,
             Contact::Dense(_) | Contact::Sparse { .. } => false,
         };
+        let ties = input.loads.ties;
         let tools: &[Tool] = match input.contact {
             Contact::Tools(tools) => tools,
-            // The elements make each step of a cut body, as if tools were there.
-            Contact::None if self.cut.is_some() => &[],
+            // The elements make each step of a cut body, and of one with ties, as if tools were there.
+            Contact::None if self.cut.is_some() || !ties.is_empty() => &[],
             _ => {
                 if let Some(problem) = &mut self.problem {
                     problem.forget_tools();
@@ -46,6 +47,7 @@ impl Core {
                 return Ok(false);
             }
         };
+        self.check_ties(ties)?;
         if self.model.prior.is_none() {
             return Err(Error::Unsupported(
                 "instruments: the bundle has no linear response to solve their contact with; pass the nodes that upt_scene_contacts_from_instruments finds".into(),
@@ -58,9 +60,10 @@ impl Core {
                 Proven::new(make, WHAT)?
             }
         };
+        let placed = self.place_ties(input, tools.len());
         let shared = lock_read(published);
         let (rest, start) = (&self.mesh.positions, &shared.last.field);
-        let begun = problem.begin(tools, rest, start);
+        let begun = placed.and_then(|()| problem.begin(tools, &self.placed_ties, rest, start));
         let state = State {
             rest,
             u: start,
@@ -104,7 +107,7 @@ impl Core {
         start: Instant,
         stats: &mut SceneStats,
     ) -> Result<bool> {
-        if self.cut.is_some() {
+        if self.cut.is_some() || problem.has_ties() {
             self.load(published, problem, start, stats)?;
             return Ok(true);
         }

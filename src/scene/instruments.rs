@@ -5,27 +5,27 @@ use std::sync::MutexGuard;
 use super::Scene;
 use super::core::lock_read;
 use super::shared::lock;
-use super::tools::Asked;
-use crate::contact::{ContactReport, MAX_TOOLS, Tool};
+use super::tools::{Asked, Lists};
+use crate::contact::{ContactReport, MAX_TOOLS};
 use crate::error::Result;
 use crate::instrument::{Instrument, InstrumentContacts};
 use crate::memory;
 
 impl Scene {
-    /// A list for the tools of a step, kept from call to call.
+    /// Lists for the tools and ties of a step, kept from call to call.
     ///
     /// # Errors
     /// [`Error::Busy`](crate::Error::Busy).
-    pub(crate) fn tool_list(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
-        lock(&self.tools.list)
+    pub(crate) fn lists(&self) -> Result<MutexGuard<'_, Lists>> {
+        lock(&self.tools.lists)
     }
 
-    /// A list for the tools of a frame between steps.
+    /// Lists for those of a frame between steps.
     ///
     /// # Errors
     /// [`Error::Busy`](crate::Error::Busy).
-    pub(crate) fn frame_tools(&self) -> Result<MutexGuard<'_, Vec<Tool>>> {
-        lock(&self.tools.frame_list)
+    pub(crate) fn frame_lists(&self) -> Result<MutexGuard<'_, Lists>> {
+        lock(&self.tools.frame_lists)
     }
 
     /// A list for instruments whose contacts are asked for.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use ::contact::Tie;
+
 use super::support::{Carriage, Carried, SupportPose};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
@@ -34,6 +36,9 @@ pub struct Loads<'a> {
     /// Where what holds the body is at the end of the step, where it moves. All else stays in the mesh's frame, which goes with the support: displacements,
     /// tools, forces. The body feels the motion as inertia. Pass it in every step; one that goes farther than 40 mm or half a radian in a step is put there.
     pub support: Option<SupportPose>,
+    /// Ties of the tissue, at most [`MAX_TIES`], beside tools or without any. A tie's place in the list is its identity: pass every tie in every step, in the same order.
+    /// A broken one stays broken in its place, until it has a stiffness of 0 there or the list ends before it.
+    pub ties: &'a [Tie],
 }
 
 /// A pressure on a part of the surface.
@@ -54,9 +59,10 @@ impl Loads<'_> {
         forces: None,
         pressures: &[],
         support: None,
+        ties: &[],
     };
 
-    /// Whether they are not all zero, or a support is given.
+    /// Whether they are not all zero, or a support is given; ties are no loads here.
     pub(crate) fn acts(&self) -> bool {
         self.acts_with(self.acceleration(None)) || self.support.is_some()
     }

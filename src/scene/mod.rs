@@ -2,6 +2,7 @@
 //! [`Error::Busy`]. Reading the published states (`read`, `sample`, their points, `stats`) is allowed from any thread
 //! at any time, also while a submitted step is in flight, and never waits for a step.
 
+mod bed;
 mod build;
 mod copied_loads;
 mod core;
@@ -43,6 +44,7 @@ mod snapshot;
 mod state;
 mod step_input;
 mod support;
+mod ties;
 mod timing;
 mod tissue;
 mod tools;
@@ -53,6 +55,7 @@ mod worker;
 use std::sync::Arc;
 use std::time::Duration;
 
+pub use bed::Bed;
 pub use cut_surface::{CutSurface, SurfaceUpdate};
 pub use cutting::{Blade, Cut};
 pub use loads::{LARGEST_FORCE, LARGEST_GRAVITY, LARGEST_PRESSURE, Loads, MAX_PRESSURES, Pressure};
@@ -61,6 +64,7 @@ pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub use published::View;
 pub use step_input::{Contact, Progress, StepInput};
 pub use support::SupportPose;
+pub(crate) use tools::Lists;
 
 use crate::bundle::Mesh;
 use crate::corrections::Integrator;

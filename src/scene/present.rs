@@ -116,8 +116,10 @@ impl Core {
     pub(super) fn fit_published(&self, published: &RwLock<Published>) -> Result<()> {
         let mut shared = lock_write(published);
         let next = self.problem.as_ref().map(|problem| &problem.next);
-        let counts = next.map_or((0, 0), |next| (next.tools.len(), next.forces.len()));
-        shared.tools.fit(counts.0, counts.1)?;
+        let counts = next.map_or((0, 0, 0), |next| {
+            (next.tools.len(), next.ties.len(), next.forces.len())
+        });
+        shared.tools.fit(counts.0, counts.1, counts.2)?;
         match &mut shared.frame_state {
             Some(frame_state) => frame_state.prepare(next, self.incoming.len()),
             None => Ok(()),

@@ -76,6 +76,18 @@ impl StepInput<'_> {
                 "displacement and instruments are both set; instruments drive the scene's own state".into(),
             ));
         }
+        let ties = !self.loads.ties.is_empty();
+        if ties && self.displacement.is_some() {
+            return Err(Error::Argument(
+                "displacement and ties are both set; ties pull on the scene's own state".into(),
+            ));
+        }
+        if ties && matches!(self.contact, Contact::Dense(_) | Contact::Sparse { .. }) {
+            return Err(Error::Argument(
+                "ties and prescribed nodes are both set; ties pull beside instruments, or alone"
+                    .into(),
+            ));
+        }
         Ok(())
     }
 

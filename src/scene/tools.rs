@@ -1,6 +1,8 @@
 //! What instruments and haptics of a scene keep between calls, made at the first use, so that a scene without them pays
 //! nothing.
 
+use ::contact::Tie;
+
 use super::elastic::Haptics;
 use super::followed_surface::Followed;
 use super::presenter::Presenters;
@@ -15,16 +17,23 @@ pub(super) struct Asked {
     pub step: Option<u64>,
 }
 
+/// What of a host's input is read into lists.
+#[derive(Default)]
+pub struct Lists {
+    pub(crate) tools: Vec<Tool>,
+    pub(crate) ties: Vec<Tie>,
+}
+
 /// What the first use makes.
 #[derive(Default)]
 pub struct Tools {
     pub(super) contacts: Mutex<Option<Asked>>,
     pub(super) presenters: Mutex<Presenters>,
     pub(super) surface: Mutex<Option<Followed>>,
-    /// The instruments of a step are read into this list, so that a call allocates nothing.
-    pub(super) list: Mutex<Vec<Tool>>,
+    /// The instruments and ties of a step are read into these lists, so that a call allocates nothing.
+    pub(super) lists: Mutex<Lists>,
     /// Those of a frame between steps: another thread may present while one steps.
-    pub(super) frame_list: Mutex<Vec<Tool>>,
+    pub(super) frame_lists: Mutex<Lists>,
     /// Those whose contacts a host asks for.
     pub(super) asked_list: Mutex<Vec<Instrument>>,
     pub(super) forces: Mutex<Option<Haptics>>,

@@ -5,6 +5,7 @@ use std::ptr::null;
 use upt::ffi::*;
 
 use super::inputs::*;
+use super::tie_calls::ties;
 use super::{Call, Function, Odd, World};
 
 /// What an input's pointers lead to.
@@ -14,6 +15,7 @@ struct Lists {
     vectors: Vec<f32>,
     field: Vec<f32>,
     pressures: Vec<upt_pressure>,
+    ties: Vec<upt_tie>,
 }
 
 impl World<'_> {
@@ -31,6 +33,7 @@ impl World<'_> {
             || input.instrument_count <= lists.tools.len() as u64
                 && input.contact_count <= lists.nodes.len() as u64
                 && input.pressure_count <= lists.pressures.len() as u64
+                && input.tie_count <= lists.ties.len() as u64
                 && (input.pressure_count == 0
                     || lists.pressures[0].node_count <= lists.nodes.len() as u64)
                 && drives < 2
@@ -128,6 +131,7 @@ impl World<'_> {
         };
         Lists {
             pressures: pascal.map(pressure).into(),
+            ties: ties(call, nodes),
             tools: self.instruments(call, 4),
             nodes: listed,
             vectors,
@@ -162,6 +166,10 @@ fn input(call: &Call, lists: &Lists, nodes: usize) -> (upt_input, usize) {
     }
     if (call.seed / 104).is_multiple_of(3) {
         load(&mut input, call, lists);
+    }
+    if (call.seed / 208).is_multiple_of(3) {
+        input.ties = lists.ties.as_ptr();
+        input.tie_count = absurd(lists.ties.len(), 256, call);
     }
     let mut time = [0.0];
     if call.seed.is_multiple_of(3) {

@@ -13,6 +13,7 @@ mod instrument_calls;
 mod library_calls;
 mod scene_calls;
 mod surface_calls;
+mod tie_calls;
 mod traps;
 mod world;
 
@@ -73,6 +74,9 @@ pub enum Function {
     UpdateSurface,
     Surface,
     SurfacePositions,
+    TieReadings,
+    TiePoints,
+    Bed,
 }
 
 /// What each function of `include/upt.h` is called by.
@@ -128,6 +132,9 @@ pub const CALLED_BY: &[(&str, Function)] = &[
     ("upt_scene_update_surface", UpdateSurface),
     ("upt_scene_surface", Surface),
     ("upt_scene_surface_positions", SurfacePositions),
+    ("upt_scene_tie_readings", TieReadings),
+    ("upt_scene_tie_points", TiePoints),
+    ("upt_scene_bed", Bed),
 ];
 
 use Function::*;
@@ -178,6 +185,7 @@ pub fn call() -> impl Strategy<Value = Call> {
         2 => few(&[HullCreate, HullCreate, HullDestroy]),
         20 => few(&[HapticsCreate, HapticsRender, HapticsRender, HapticsRender, HapticsDestroy]),
         6 => few(&[Cut, CutWith, Remove, ScaleStiffness, DropFragments]),
+        6 => few(&[TieReadings, TieReadings, TiePoints, Bed]),
         6 => few(&[NodeCount, UpdateSurface, UpdateSurface, Surface, SurfacePositions]),
         12 => few(&[Submit, Submit, Poll, Wait, Wait]),
         30 => few(&[

@@ -204,6 +204,7 @@ impl<'a> World<'a> {
             NodeCount | UpdateSurface | Surface | SurfacePositions => {
                 self.call_surface(call, scene)
             }
+            TieReadings | TiePoints | Bed => self.call_ties(call, scene, nodes),
             HapticsCreate | HapticsRender | HapticsDestroy => self.call_haptics(call, scene),
             _ => self.call_scene(call, scene, nodes),
         }

@@ -74,7 +74,7 @@ fn loads_give_the_bits_of_the_rust_interface() {
                 gravity_at_rest: [0.0, 0.0, -9.81],
                 forces: Some(&forces),
                 pressures: &pressures,
-                support: None,
+                ..Loads::default()
             },
             ..StepInput::default()
         };

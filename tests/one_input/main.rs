@@ -6,6 +6,7 @@
     reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
 )]
 
+mod beds;
 #[path = "../fixture/mod.rs"]
 mod fixture;
 #[path = "../host/mod.rs"]
@@ -13,6 +14,7 @@ mod host;
 mod loads;
 mod mistakes;
 mod supports;
+mod ties;
 
 use std::ptr::{null, null_mut};
 

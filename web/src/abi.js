@@ -80,6 +80,10 @@ export const UPT_SHAPE_HULL = 3;
 export const UPT_SHAPE_SPHERE = 4;
 export const UPT_MODE_SLIDE = 0;
 export const UPT_MODE_GRASP = 1;
+export const UPT_END_SUPPORT = 0;
+export const UPT_END_WORLD = 1;
+export const UPT_END_INSTRUMENT = 2;
+export const UPT_END_TISSUE = 3;
 export const UPT_ABI_VERSION = 1;
 export const upt_init_options = {
   size: 12,
@@ -239,7 +243,7 @@ export const upt_scene_stats = {
   },
 };
 export const upt_input = {
-  size: 128,
+  size: 144,
   fields: {
     struct_size: ["Uint32", 0, 1],
     reserved: ["Uint8", 4, 4],
@@ -254,11 +258,13 @@ export const upt_input = {
     forces: ["Uint32", 56, 1],
     pressures: ["Uint32", 60, 1],
     pressure_count: ["BigUint64", 64, 1],
-    gravity: ["Float32", 72, 3],
-    gravity_at_rest: ["Float32", 84, 3],
-    support_position: ["Float32", 96, 3],
-    support_rotation: ["Float32", 108, 4],
-    reserved_end: ["Uint8", 124, 4],
+    ties: ["Uint32", 72, 1],
+    tie_count: ["BigUint64", 80, 1],
+    gravity: ["Float32", 88, 3],
+    gravity_at_rest: ["Float32", 100, 3],
+    support_position: ["Float32", 112, 3],
+    support_rotation: ["Float32", 124, 4],
+    reserved_end: ["Uint8", 140, 4],
   },
 };
 export const upt_pressure = {
@@ -268,6 +274,53 @@ export const upt_pressure = {
     pascal: ["Float32", 4, 1],
     nodes: ["Uint32", 8, 1],
     node_count: ["BigUint64", 16, 1],
+  },
+};
+export const upt_tie = {
+  size: 92,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    to: ["Int32", 4, 1],
+    nodes: ["Uint32", 8, 3],
+    weights: ["Float32", 20, 3],
+    place: ["Float32", 32, 3],
+    instrument: ["Uint32", 44, 1],
+    other_nodes: ["Uint32", 48, 3],
+    other_weights: ["Float32", 60, 3],
+    stiffness: ["Float32", 72, 1],
+    slack_mm: ["Float32", 76, 1],
+    damping: ["Float32", 80, 1],
+    break_mn: ["Float32", 84, 1],
+    pushes: ["Uint8", 88, 1],
+    reserved: ["Uint8", 89, 3],
+  },
+};
+export const upt_tie_reading = {
+  size: 24,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    broken: ["Uint8", 4, 1],
+    broke: ["Uint8", 5, 1],
+    reserved: ["Uint8", 6, 2],
+    force: ["Float32", 8, 3],
+    length_mm: ["Float32", 20, 1],
+  },
+};
+export const upt_bed = {
+  size: 72,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    radius_mm: ["Float32", 4, 1],
+    centre: ["Float32", 8, 3],
+    offset: ["Float32", 20, 3],
+    nodes: ["Uint32", 32, 1],
+    node_count: ["BigUint64", 40, 1],
+    stiffness: ["Float32", 48, 1],
+    slack_mm: ["Float32", 52, 1],
+    damping: ["Float32", 56, 1],
+    break_mn: ["Float32", 60, 1],
+    pushes: ["Uint8", 64, 1],
+    reserved: ["Uint8", 65, 7],
   },
 };
 export const upt_view = {

@@ -12,7 +12,7 @@ const BEGIN: &str = "<!-- cargo xtask header: begin -->\n";
 const END: &str = "<!-- cargo xtask header: end -->";
 
 /// Headings of the calls, by the file of `src/ffi/` that holds them.
-const CHAPTERS: [(&str, &str); 13] = [
+const CHAPTERS: [(&str, &str); 14] = [
     ("library.rs", "Library"),
     ("model.rs", "Models"),
     ("scene.rs", "Scenes and steps"),
@@ -20,6 +20,7 @@ const CHAPTERS: [(&str, &str); 13] = [
     ("region.rs", "Parts of the mesh"),
     ("points.rs", "Attached points"),
     ("driven.rs", "What instruments are told, and hulls"),
+    ("ties.rs", "Ties and beds"),
     ("cut.rs", "Cuts, removal, stiffness"),
     ("surface.rs", "The surface of a cut body"),
     ("present.rs", "Frames between steps"),
@@ -29,7 +30,7 @@ const CHAPTERS: [(&str, &str); 13] = [
 ];
 
 /// Headings of the constants, by prefix.
-const FAMILIES: [(&str, &str); 14] = [
+const FAMILIES: [(&str, &str); 15] = [
     ("UPT_ABI_", "Version"),
     ("UPT_PROVIDER_", "Providers"),
     ("UPT_KIND_", "Model kinds"),
@@ -44,6 +45,7 @@ const FAMILIES: [(&str, &str); 14] = [
     ("UPT_VIEW_", "Views"),
     ("UPT_SHAPE_", "Instrument shapes"),
     ("UPT_MODE_", "Instrument modes"),
+    ("UPT_END_", "Far ends of ties"),
 ];
 
 /// The page with its generated part made anew; what people wrote around it stays.

@@ -9,7 +9,7 @@ use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
 pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
-pub const FILES: [&str; 17] = [
+pub const FILES: [&str; 18] = [
     "../status.rs",
     "constants.rs",
     "structs.rs",
@@ -21,6 +21,7 @@ pub const FILES: [&str; 17] = [
     "region.rs",
     "points.rs",
     "driven.rs",
+    "ties.rs",
     "cut.rs",
     "surface.rs",
     "present.rs",

@@ -2,6 +2,7 @@
 
 use super::{ContactProblem, WHAT};
 use crate::contact::past::Force;
+use crate::contact::ties::tie_of;
 use crate::error::Result;
 use crate::memory;
 
@@ -16,7 +17,11 @@ impl ContactProblem {
     pub fn stay(&mut self) {
         self.restart();
         let count = self.tools.len();
-        let there = |force: &Force| (force.tool as usize) < count;
+        let ties = self.tied.list.len();
+        let there = |force: &Force| match tie_of(force.sample) {
+            Some(index) => index < ties,
+            None => (force.tool as usize) < count,
+        };
         self.next.forces.retain(there);
     }
 

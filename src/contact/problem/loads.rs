@@ -6,6 +6,7 @@ use ::contact::grasp::tension;
 use super::ContactProblem;
 use crate::contact::past::Force;
 use crate::contact::state::{State, vector};
+use crate::contact::ties::NO_TOOL;
 use crate::contact::tool::{ContactReport, Push, ToolReading};
 use crate::envelope::ToolUse;
 
@@ -18,18 +19,36 @@ impl ContactProblem {
         self.next.tools.iter().any(|held| held.reading.torn)
     }
 
+    /// Nodes of the samples that push and of the ties, ascending, without held ones.
+    pub fn reached(&mut self, held: &[bool]) -> &[u32] {
+        self.gather_touched(held);
+        self.add_tied_nodes(held);
+        self.nodes.sort_unstable();
+        self.nodes.dedup();
+        &self.nodes
+    }
+
     /// Nodes of the samples that push, ascending, without held ones.
     pub fn touched(&mut self, held: &[bool]) -> &[u32] {
+        self.gather_touched(held);
+        self.nodes.sort_unstable();
+        self.nodes.dedup();
+        &self.nodes
+    }
+
+    fn gather_touched(&mut self, held: &[bool]) {
         self.nodes.clear();
-        for force in &self.next.forces {
+        for force in self
+            .next
+            .forces
+            .iter()
+            .filter(|force| force.tool != NO_TOOL)
+        {
             let sample = self.samples.at(force.sample);
             let nodes = sample.entries().map(|entry| entry.0);
             self.nodes
                 .extend(nodes.filter(|node| !held[*node as usize]));
         }
-        self.nodes.sort_unstable();
-        self.nodes.dedup();
-        &self.nodes
     }
 
     /// Calls with each node's share of the forces on the tissue, mN.
@@ -43,8 +62,9 @@ impl ContactProblem {
     }
 
     fn each_nodal_force(&self, forces: &[Force], mut take: impl FnMut(u32, Vector)) {
+        let points = self.points();
         for force in forces {
-            for (node, weight) in self.samples.at(force.sample).entries() {
+            for (node, weight) in points.at(force.sample).entries() {
                 take(node, force.force * weight);
             }
         }
@@ -52,6 +72,12 @@ impl ContactProblem {
 
     /// Sums up what each tool feels at `state`, the end of the step, and tears grasps that are pulled too hard.
     pub fn finish(&mut self, state: State<'_>) {
+        self.finish_with(state, true);
+    }
+
+    /// The same; with `breaks` ties break that are pulled too hard.
+    pub fn finish_with(&mut self, state: State<'_>, breaks: bool) {
+        self.finish_ties(state, breaks);
         for index in 0..self.tools.len() {
             let penetration_mm = self.depth(index, state, 1.0);
             let tool = &self.tools[index];
@@ -69,6 +95,9 @@ impl ContactProblem {
                     normal += tool.body.nearest_at(&tool.pose, point).normal;
                 }
             }
+            let (tied, turned) = self.pull_of_ties(index as u32);
+            force += tied;
+            torque += turned;
             let held = &mut self.next.tools[index];
             let pull = tension(pull, normal.normalize_or_zero());
             let tear_off = match tool.tear_off_mn > 0.0 {
@@ -111,7 +140,11 @@ impl ContactProblem {
         report
             .readings
             .extend(self.past.tools.iter().map(|held| held.reading));
-        for force in &self.past.forces {
+        report
+            .ties
+            .extend(self.past.ties.iter().map(|held| held.reading));
+        let own = self.past.forces.iter();
+        for force in own.filter(|force| force.tool != NO_TOOL) {
             let sample = self.samples.at(force.sample);
             report.pushes.push(Push {
                 tool: force.tool,

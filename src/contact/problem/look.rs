@@ -6,6 +6,7 @@ use super::{ContactProblem, WHAT};
 use crate::contact::buried::Buried;
 use crate::contact::rows::{Moving, Row, outward};
 use crate::contact::state::State;
+use crate::contact::ties::NO_TOOL;
 use crate::contact::tool::MAX_TOOLS;
 use crate::error::Result;
 use crate::memory;
@@ -14,7 +15,7 @@ pub(super) use crate::contact::rows::MOST_ROWS;
 
 impl ContactProblem {
     /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held; at the end of the
-    /// way also those that the tools have passed; `most` rows at most. `wide` takes all that the tools may reach as they move.
+    /// way also those that the tools have passed; `most` rows at most, and those of ties. `wide` takes all that the tools may reach as they move.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
@@ -75,7 +76,11 @@ impl ContactProblem {
                 .extend(own.map(|sample| row(tool, sample, Vector::ZERO, false)));
         }
         memory::reserve(&mut self.rows, self.next.forces.len(), WHAT)?;
-        let pushed = self.next.forces.iter();
+        let pushed = self
+            .next
+            .forces
+            .iter()
+            .filter(|force| force.tool != NO_TOOL);
         self.rows
             .extend(pushed.map(|force| row(force.tool, force.sample, force.force, false)));
         // Those with a force come first of their equals, and stay; then those that are held.
@@ -97,7 +102,7 @@ impl ContactProblem {
             memory::fit(&mut self.shed, self.rows.len() - most, WHAT)?;
             self.keep_deepest(state, part, most);
         }
-        Ok(())
+        self.look_at_ties(state)
     }
 
     /// The tools at part `part` of their way.
@@ -112,6 +117,7 @@ impl ContactProblem {
             samples: &self.samples,
             state,
             part,
+            pulling: self.pulling(),
         }
     }
 

@@ -9,6 +9,8 @@ mod forces;
 mod loads;
 mod look;
 mod solve;
+mod tie_set;
+mod tied;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,6 +21,7 @@ use ::contact::grasp::REACH_MM;
 use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector};
 
 pub use solve::Change;
+use tie_set::TieSet;
 
 use super::buried::Buried;
 use super::compliance::Delassus;
@@ -26,6 +29,7 @@ use super::inertial_compliance::InertialCompliance;
 use super::past::{Force, Held, Past};
 use super::rows::Row;
 use super::state::State;
+use super::ties::Placed;
 use super::tool::{MAX_TOOLS, Mode, PUT_MM, Tool, ToolReading};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
@@ -68,6 +72,7 @@ pub struct ContactProblem {
     trusted: Vec<f32>,
     /// For each that lay in the tissue when the step began, the shortest way out.
     buried: Vec<Option<Buried>>,
+    tied: TieSet,
     /// At the end of the last published step.
     pub past: Past,
     /// Of the step being made.
@@ -125,6 +130,7 @@ impl ContactProblem {
             may_lose: memory::room(MAX_TOOLS, WHAT)?,
             trusted: memory::room(MAX_TOOLS, WHAT)?,
             buried: memory::room(MAX_TOOLS, WHAT)?,
+            tied: TieSet::default(),
             past: Past::with_room(room)?,
             next: Past::with_room(room)?,
             search: memory::tried(Search::with_room(&samples), WHAT)?,
@@ -161,7 +167,7 @@ impl ContactProblem {
         self.past.clear();
     }
 
-    /// A step without tools. What the last step left stays in `past` until this one is published, in case it is refused.
+    /// A step without tools and ties. What the last step left stays in `past` until this one is published, in case it is refused.
     pub fn forget_tools(&mut self) {
         self.tools.clear();
         self.before.clear();
@@ -169,6 +175,7 @@ impl ContactProblem {
         self.swept.clear();
         self.may_lose.clear();
         self.buried.clear();
+        self.tied.clear();
         self.next.clear();
     }
 
@@ -192,28 +199,41 @@ impl ContactProblem {
         &self.before
     }
 
-    /// Takes the tools of a step that begins at `start`. A tool's place in the list is its identity from step to step.
+    /// Takes the tools and ties of a step that begins at `start`. The place of each in its list is its identity from step to step.
     ///
     /// # Errors
     /// [`Error::Argument`] for friction, tear-off force or number, [`Error::OutOfMemory`]; the past stays.
-    pub fn begin(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
+    pub fn begin(
+        &mut self,
+        tools: &[Tool],
+        ties: &[Placed],
+        rest: &[f32],
+        start: &[f32],
+    ) -> Result<()> {
         self.spent = Duration::ZERO;
         self.work_left = STEP_WORK;
         self.unsolved_mm = 0.0;
         self.until = None;
         self.lay_in_tissue = false;
-        self.enter(tools, rest, start)?;
+        self.enter(tools, ties, rest, start)?;
         if !self.may_lose() {
             self.work_left = LONGEST_STEP_WORK;
         }
+        self.work_left += self.tied.work();
         Ok(())
     }
 
-    /// Takes the tools of a substep that begins at `start`. The step's budgets of time and work go on.
+    /// Takes the tools and ties of a substep that begins at `start`. The step's budgets of time and work go on.
     ///
     /// # Errors
     /// As [`ContactProblem::begin`].
-    pub fn enter(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
+    pub fn enter(
+        &mut self,
+        tools: &[Tool],
+        ties: &[Placed],
+        rest: &[f32],
+        start: &[f32],
+    ) -> Result<()> {
         if tools.len() > MAX_TOOLS {
             return Err(Error::Argument(format!(
                 "{} instruments; at most {MAX_TOOLS} are allowed at once",
@@ -226,6 +246,7 @@ impl ContactProblem {
         self.tools.clear();
         self.tools.extend_from_slice(tools);
         self.next.take(&self.past)?;
+        self.tie(ties)?;
         self.next.tools.truncate(tools.len());
         memory::fit(&mut self.next.tools, tools.len(), WHAT)?;
         let state = State {
@@ -286,12 +307,12 @@ impl ContactProblem {
         Ok(())
     }
 
-    /// Whether a tool is near enough to touch the tissue in this step, or pushed it in the last.
+    /// Whether a tool is near enough to touch the tissue in this step, or pushed it in the last, or there are ties.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
     pub fn is_near(&mut self, state: State<'_>) -> Result<bool> {
-        if !self.next.forces.is_empty() || self.has_grasp() {
+        if !self.next.forces.is_empty() || self.has_grasp() || self.has_ties() {
             return Ok(true);
         }
         self.look(state, 1.0, true, MOST_ROWS)?;

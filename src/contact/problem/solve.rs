@@ -10,6 +10,7 @@ use crate::contact::Compliance;
 use crate::contact::past::Force;
 use crate::contact::rows::Moving;
 use crate::contact::state::{State, vector};
+use crate::contact::ties::{NO_TOOL, Points, Pulling};
 use crate::error::Result;
 use crate::memory;
 
@@ -117,14 +118,18 @@ impl ContactProblem {
         self.fit()?;
         self.forces.clear();
         self.forces.extend(self.rows.iter().map(|row| row.force));
-        let samples = &self.samples;
         self.columns.clear();
         self.columns.extend(self.rows.iter().map(|row| row.sample));
         let own = match compliance.tangent {
             Some(_) => &mut self.tangent,
             None => &mut self.delassus,
         };
-        let (all, rows) = (&**samples, &self.columns);
+        let all = Points {
+            samples: &self.samples,
+            ties: &self.tied.list,
+            generation: self.tied.generation,
+        };
+        let rows = &self.columns;
         let (mut whole, mut at);
         let w: &mut dyn Rows = match time {
             Time::StepEnd => {
@@ -149,6 +154,14 @@ impl ContactProblem {
             samples: &self.samples,
             state,
             part,
+            pulling: Pulling {
+                ties: &self.tied.list,
+                held: &self.next.ties,
+                from: &self.tied.from,
+                tools: &self.tools,
+                before: &self.before,
+                step_s: self.tied.step_s,
+            },
         };
         // Only for what is quick or thin: what was put into the tissue may find its way out by any side.
         self.trusted.clear();
@@ -189,7 +202,11 @@ impl ContactProblem {
                 pairs.filter(|(_, (now, before))| **now != **before || **now != Vector::ZERO);
             let ways = ways.map(|(at, _)| {
                 let tool = self.rows[at].tool as usize;
-                let way = self.trusted.get(tool).map_or(LEAST_WAY_MM, |way| *way);
+                let way = match self.rows[at].tool {
+                    // A tie's law holds however far it goes.
+                    NO_TOOL => f32::MAX,
+                    _ => self.trusted.get(tool).map_or(LEAST_WAY_MM, |way| *way),
+                };
                 self.sweeps.shift(at).length() / way
             });
             let part = 1.0 / ways.fold(1.0, f32::max);
@@ -207,7 +224,7 @@ impl ContactProblem {
         self.next.forces.clear();
         self.columns.clear();
         for (row, force) in self.rows.iter().zip(&self.forces) {
-            let sample = self.samples.at(row.sample);
+            let sample = all.at(row.sample);
             if *force != row.force {
                 self.columns
                     .extend(compliance.entries(sample).map(|entry| entry.0));
@@ -236,7 +253,7 @@ impl ContactProblem {
             if change == Vector::ZERO {
                 continue;
             }
-            for (column, weight) in compliance.entries(self.samples.at(sample)) {
+            for (column, weight) in compliance.entries(all.at(sample)) {
                 let at = 3 * self.columns.partition_point(|c| *c < column);
                 for (sum, value) in self.change[at..at + 3].iter_mut().zip(change.to_array()) {
                     *sum += weight * value;
@@ -266,11 +283,11 @@ impl ContactProblem {
         memory::fit(&mut self.forces, rows, WHAT)?;
         memory::fit(&mut self.earlier, rows, WHAT)?;
         memory::fit(&mut self.contacts, rows, WHAT)?;
-        // Three nodes a sample and three axes a node; `blend` gives forces of before their part back.
-        let changed = rows + self.shed.len();
+        // Three nodes a sample, six a tie, and three axes a node; `blend` gives forces of before their part back.
+        let changed = rows + self.shed.len() + self.tied.list.len();
         memory::fit(&mut self.columns, 9 * changed, WHAT)?;
         memory::fit(&mut self.change, 9 * changed, WHAT)?;
-        let forces = rows + self.kept.len();
+        let forces = rows + self.kept.len() + self.tied.list.len();
         memory::fit(&mut self.next.forces, forces.max(self.guessed.len()), WHAT)?;
         memory::fit(&mut self.nodes, 3 * forces, WHAT)?;
         memory::fit(&mut self.vectors, 9 * forces, WHAT)

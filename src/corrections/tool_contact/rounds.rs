@@ -126,7 +126,7 @@ impl ImplicitSolver {
         at: &Iterate<'_>,
     ) -> Result<()> {
         let env = context.env();
-        let nodes = problem.touched(&env.body.held);
+        let nodes = problem.reached(&env.body.held);
         let level = self.motion.level as usize;
         let (local, mut step) = self.local_solver(context, input)?;
         local.level = level;

@@ -267,7 +267,8 @@ impl Between {
                     return Ok(true);
                 }
             };
-            self.problem.begin(tools, rest, last)?;
+            self.problem.begin_frame(tools, rest, last)?;
+            self.problem.take_length(tau as f32);
             let state = State {
                 rest,
                 u: &self.free,
@@ -351,7 +352,7 @@ impl Between {
             return Ok(false);
         };
         let (rest, last) = (scene.mesh.positions.as_slice(), self.last.as_slice());
-        self.problem.begin(tools, rest, last)?;
+        self.problem.begin_frame(tools, rest, last)?;
         if !self.problem.may_lose() {
             return Ok(false);
         }

@@ -13,13 +13,13 @@ impl Core {
     /// A copy of what contact of instruments remembers.
     pub(super) fn tools(&self) -> Result<Option<Tools>> {
         match &self.problem {
-            Some(problem) if !problem.past.tools.is_empty() => problem.past.copy().map(Some),
+            Some(problem) if !problem.past.is_empty() => problem.past.copy().map(Some),
             _ => Ok(None),
         }
     }
 
     pub(super) fn admit_tools(&self, tools: &mut Tools) -> Result<()> {
-        tools.check(&*self.model.samples()?)
+        tools.check(&*self.model.samples()?, self.mesh.node_count())
     }
 
     pub(in crate::scene) fn put_tools(&mut self, tools: Option<Tools>) -> Result<()> {
@@ -40,6 +40,7 @@ impl Core {
     pub(super) fn tool_bytes(&self) -> usize {
         // A sample may be pushed and held by each of the tools; more than all samples once is never seen.
         let faces = self.mesh.domain_faces.len() / 3;
-        64 * MAX_TOOLS + 4096 + 16 * 64 * faces
+        let ties = (self.problem.as_ref()).map_or(0, |problem| problem.past.ties.len());
+        64 * MAX_TOOLS + 4096 + 16 * 64 * faces + 160 * ties
     }
 }

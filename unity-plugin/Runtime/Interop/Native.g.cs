@@ -347,6 +347,13 @@ namespace Upt.Interop
         public upt_pressure* pressures;
         /// <summary>At most 32.</summary>
         public ulong pressure_count;
+        /// <summary>
+        /// `[tie_count]`: ties of the tissue, all with the same `struct_size`, beside instruments or alone. A tie's place in the array is its identity: pass every tie
+        /// every time, in the same order. A broken one stays broken in its place until it has a stiffness of 0 there, the array ends before it, or the scene is reset.
+        /// </summary>
+        public upt_tie* ties;
+        /// <summary>At most 256.</summary>
+        public ulong tie_count;
         /// <summary>Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.</summary>
         public fixed float gravity[3];
         /// <summary>Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.</summary>
@@ -375,6 +382,91 @@ namespace Upt.Interop
         public uint* nodes;
         /// <summary>At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare.</summary>
         public ulong node_count;
+    }
+
+    /// <summary>A tie: a spring between a point of the tissue and something else, an element of `upt_input.ties`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_tie
+    {
+        /// <summary>`sizeof(upt_tie)`, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>What it is tied to: `UPT_END_*`.</summary>
+        public int to;
+        /// <summary>The point of the tissue: nodes, of which one at least is free and near the domain, ...</summary>
+        public fixed uint nodes[3];
+        /// <summary>... and their weights, 0 or more, with the sum 1; all zero: the first node alone. `upt_scene_tie_points` finds both.</summary>
+        public fixed float weights[3];
+        /// <summary>
+        /// Where its far end is at the end of the step, mm: in the mesh's frame, in the world, or in the instrument's frame. It comes there on a line within the step; one
+        /// that goes farther than 40 mm is put there.
+        /// </summary>
+        public fixed float place[3];
+        /// <summary>Tied to an instrument: its place in `upt_input.instruments`.</summary>
+        public uint instrument;
+        /// <summary>Tied to the tissue: the other point, as `nodes` and `weights`.</summary>
+        public fixed uint other_nodes[3];
+        /// <summary>See `other_nodes`.</summary>
+        public fixed float other_weights[3];
+        /// <summary>N/m, which is mN/mm, at most 1000000; 0: it does not pull.</summary>
+        public float stiffness;
+        /// <summary>It pulls where it is longer than this, mm.</summary>
+        public float slack_mm;
+        /// <summary>N s/m, which is mN s/mm.</summary>
+        public float damping;
+        /// <summary>It breaks under a larger tension at the end of a step, mN; 0: never. Where several would, those break first that are pulled hardest for what they bear.</summary>
+        public float break_mn;
+        /// <summary>1: it pushes where it is shorter than `slack_mm`, as a rod does; 0: it is a thread.</summary>
+        public byte pushes;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[3];
+    }
+
+    /// <summary>What a tie does at the end of a step; filled by `upt_scene_tie_readings`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_tie_reading
+    {
+        /// <summary>`sizeof(upt_tie_reading)`, set by the caller, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>1: it has broken, in this step or before.</summary>
+        public byte broken;
+        /// <summary>1: it broke in this step.</summary>
+        public byte broke;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[2];
+        /// <summary>On the tissue at the tie's point, mN.</summary>
+        public fixed float force[3];
+        /// <summary>From end to end, mm.</summary>
+        public float length_mm;
+    }
+
+    /// <summary>A bed: what holds a region of the surface, for `upt_scene_bed`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_bed
+    {
+        /// <summary>`sizeof(upt_bed)`.</summary>
+        public uint struct_size;
+        /// <summary>mm: with no `nodes`, the region is what lies this close to `centre` in the last state.</summary>
+        public float radius_mm;
+        /// <summary>mm, in the mesh's frame.</summary>
+        public fixed float centre[3];
+        /// <summary>From each node to where it is tied, mm; zeros: where it is in the last state.</summary>
+        public fixed float offset[3];
+        /// <summary>`[node_count]`: the nodes that it ties.</summary>
+        public uint* nodes;
+        /// <summary>At most K; 0: those about `centre`.</summary>
+        public ulong node_count;
+        /// <summary>Of all ties together, N/m.</summary>
+        public float stiffness;
+        /// <summary>Of each tie, mm.</summary>
+        public float slack_mm;
+        /// <summary>Of all ties together, N s/m.</summary>
+        public float damping;
+        /// <summary>Of all ties together, mN; 0: it never breaks.</summary>
+        public float break_mn;
+        /// <summary>As in `upt_tie`.</summary>
+        public byte pushes;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[7];
     }
 
     /// <summary>What is shown of a state. Where a call takes one, NULL is the region.</summary>
@@ -684,6 +776,14 @@ namespace Upt.Interop
         /// or the grasp tears off.
         /// </summary>
         public const int UPT_MODE_GRASP = 1;
+        /// <summary>A tie's far end is in the mesh's frame, which goes with the support.</summary>
+        public const int UPT_END_SUPPORT = 0;
+        /// <summary>A tie's far end is in the world, which is the mesh's frame where no support moves.</summary>
+        public const int UPT_END_WORLD = 1;
+        /// <summary>A tie's far end is on an instrument.</summary>
+        public const int UPT_END_INSTRUMENT = 2;
+        /// <summary>A tie's far end is another point of the tissue: a suture.</summary>
+        public const int UPT_END_TISSUE = 3;
         /// <summary>Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.</summary>
         public const uint UPT_ABI_VERSION = 1;
 
@@ -1087,6 +1187,47 @@ namespace Upt.Interop
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_hull_destroy(IntPtr hull);
+
+        /// <summary>
+        /// Copies what each tie of the last step does at its end.
+        ///
+        /// - `out`: `[count]`, in the order of the step's ties; set `struct_size` of every element.
+        /// - `count`: ties of that step.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+        /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of ties.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_tie_readings(IntPtr scene, upt_tie_reading* @out, ulong count);
+
+        /// <summary>
+        /// Finds the points of the tissue nearest to places, for ties: of the domain, the surface that instruments may touch, where it is in the last state.
+        ///
+        /// - `places`: `[count,3]`, mm, in the mesh's frame.
+        /// - `nodes`: `[count,3]`, `weights`: `[count,3]`: of each the nodes of a face and the weights of its corners, for `upt_tie`.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` for a bundle without a domain,
+        /// `UPT_ERR_UNSUPPORTED` for a cut body and in a build without feature "instruments"; nothing is written then.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_tie_points(IntPtr scene, float* places, ulong count, uint* nodes, float* weights);
+
+        /// <summary>
+        /// Makes a bed: a tie at each free node of the domain within a region, from where the node is in the last state. Pass them in every step; a bed tears node by node.
+        ///
+        /// - `bed`: its region, and what holds there altogether: stiffness, damping and break force are shared among the ties by the area of surface around each node.
+        /// - `ties`: `[capacity]`, ascending by node; set `struct_size` of every element. NULL with capacity 0 only queries the size.
+        /// - `needed`: number of ties, written whenever there is a bed.
+        ///
+        /// Threads: any, at any time, even while a step runs.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` for a region without such nodes or with more than
+        /// 256, for a number that no tie can have, and if capacity is too small; `UPT_ERR_UNSUPPORTED` for a cut body and in a build without feature "instruments";
+        /// `UPT_ERR_OUT_OF_MEMORY`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_bed(IntPtr scene, upt_bed* bed, upt_tie* ties, ulong capacity, ulong* needed);
 
         /// <summary>
         /// Cuts along the way of a blade's edge through the tissue as it is now. Elements that the blade touches become two, with copies of

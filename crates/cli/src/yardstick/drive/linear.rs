@@ -53,7 +53,7 @@ impl Linear {
             u: start,
             start,
         };
-        self.problem.begin(tools, &self.rest, start)?;
+        self.problem.begin(tools, &[], &self.rest, start)?;
         let (mut nodes, mut vectors) = (Vec::new(), Vec::new());
         if self.problem.is_near(state)? {
             let compliance = Compliance::at_rest(self.prior.table(), self.prior.held(), None);
