@@ -208,6 +208,12 @@ public:
     std::copy_n(rotation, 4, raw_.support_rotation);
     return *this;
   }
+  /// Ties, every time and in the same order; struct_size is set in each.
+  Input &ties(span<const upt_tie> ties) noexcept {
+    raw_.ties = ties.data();
+    raw_.tie_count = ties.size();
+    return *this;
+  }
   const upt_input *get() const noexcept { return &raw_; }
   /// Whether the spans' sizes agree; a call that takes an input that does not fit refuses it.
   bool fits() const noexcept { return fits_; }
@@ -511,6 +517,27 @@ public:
     }
     return check(upt_scene_instrument_readings(handle_, out.data(), out.size()));
   }
+  /// What each tie of the last step does; out has one element for each.
+  upt_status tie_readings(span<upt_tie_reading> out) {
+    for (upt_tie_reading &reading : out) {
+      reading = make<upt_tie_reading>();
+    }
+    return check(upt_scene_tie_readings(handle_, out.data(), out.size()));
+  }
+  /// The point of the tissue nearest to a place (mm) becomes that of a tie.
+  upt_status tie_point(const float *place, upt_tie &tie) {
+    return check(upt_scene_tie_points(handle_, place, 1, tie.nodes, tie.weights));
+  }
+  /// The ties of a bed: pass them in every step.
+  upt_status bed(const upt_bed &bed, std::vector<upt_tie> &out) {
+    std::uint64_t needed = 0;
+    upt_status status = check(upt_scene_bed(handle_, &bed, nullptr, 0, &needed));
+    if (status == UPT_OK) {
+      out.assign(static_cast<std::size_t>(needed), make<upt_tie>());
+      status = check(upt_scene_bed(handle_, &bed, out.data(), out.size(), &needed));
+    }
+    return status;
+  }
   /// The points of the surface that push or hold instruments at the end of the last step.
   upt_status instrument_contacts(std::vector<upt_instrument_contact> &out) {
     std::uint64_t needed = 0;
@@ -618,6 +645,16 @@ public:
   std::vector<upt_instrument_reading> readings(std::size_t count) {
     std::vector<upt_instrument_reading> out(count);
     readings(out);
+    return out;
+  }
+  std::vector<upt_tie_reading> tie_readings(std::size_t count) {
+    std::vector<upt_tie_reading> out(count);
+    tie_readings(out);
+    return out;
+  }
+  std::vector<upt_tie> bed(const upt_bed &bed) {
+    std::vector<upt_tie> out;
+    this->bed(bed, out);
     return out;
   }
   std::vector<upt_instrument_contact> instrument_contacts() {

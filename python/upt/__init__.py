@@ -38,6 +38,7 @@ from upt._native import (
     Shape,
     Status,
     StepPath,
+    TieReading,
     ViewKind,
 )
 from upt.batch import BatchedScenes
@@ -61,6 +62,7 @@ from upt.loads import Loads
 from upt.log import set_log
 from upt.model import Model
 from upt.scene import Scene
+from upt.ties import Tie
 
 #: The library's version.
 __version__: str = lib.upt_version().decode()
@@ -118,6 +120,8 @@ __all__ = [
     "Status",
     "StepPath",
     "Surface",
+    "Tie",
+    "TieReading",
     "UnsupportedError",
     "ViewKind",
     "bundle",

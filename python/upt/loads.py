@@ -1,4 +1,4 @@
-"""What acts on the body beside contact: gravity, forces, pressure on the surface, a support that moves."""
+"""What acts on the body beside contact: gravity, forces, pressure on the surface, a support that moves, ties."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from upt import _native
 from upt._arrays import address, number, vectors
+from upt.ties import Tie
 
-#: The end of `upt_input`: forces, pressures, how many, gravity and that at rest, the support's pose.
-_LAYOUT = Struct("@PPQ13f")
+#: The end of `upt_input`: forces, pressures and ties, how many of each, gravity and that at rest, the support's pose.
+_LAYOUT = Struct("@PPQPQ13f")
 OFFSET: int = _native.Input.forces.offset  # type: ignore[union-attr]
 
 
@@ -42,6 +43,9 @@ class Loads:
 
     All else stays in the mesh's frame, which goes with the support, but gravity, which is the world's then."""
 
+    ties: Sequence[Tie] = ()
+    """Ties of the tissue, at most 256, beside instruments or alone; in every step, in the same order."""
+
     def pack_into(self, memory: bytearray, node_count: int) -> object:
         """Puts these loads into a `upt_input`; gives what must live over the call."""
         forces = None if self.forces is None else vectors(self.forces, "forces", node_count)
@@ -58,6 +62,9 @@ class Loads:
         gravity = [number(value, "gravity") for value in (*self.gravity, *self.gravity_at_rest)]
         position, rotation = self.support or ((0.0,) * 3, (0.0,) * 4)
         gravity += [number(value, "support") for value in (*position, *rotation)]
-        at = addressof(array) if records else 0
-        _LAYOUT.pack_into(memory, OFFSET, 0 if forces is None else address(forces), at, len(records), *gravity)
-        return forces, regions, array
+        ties = [tie.record(f"ties[{index}]") for index, tie in enumerate(self.ties)]
+        tied = (_native.Tie * len(ties))(*ties)
+        at, tied_at = addressof(array) if records else 0, addressof(tied) if ties else 0
+        pushed = 0 if forces is None else address(forces)
+        _LAYOUT.pack_into(memory, OFFSET, pushed, at, len(records), tied_at, len(ties), *gravity)
+        return forces, regions, array, tied

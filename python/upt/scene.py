@@ -21,6 +21,7 @@ from upt._native import InstrumentContact, InstrumentReading, SceneOptions, Scen
 from upt.cuts import Cuts
 from upt.instrument import Instrument, records
 from upt.loads import Loads
+from upt.ties import Ties
 
 if TYPE_CHECKING:
     if sys.version_info >= (3, 12):
@@ -47,7 +48,7 @@ class OpenModel(Protocol):
         ...
 
 
-class Scene(Cuts):
+class Scene(Cuts, Ties):
     """One deforming body, made by `Model.scene`.
 
     Arrays are float32, `[n, 3]`, mm; node indices are uint32. An input that is C-contiguous and of this type is not
@@ -65,6 +66,7 @@ class Scene(Cuts):
         self._steps, self._frames, self._others = Outputs(), Outputs(), Outputs()
         self._point_count = 0
         self._instrument_count = 0
+        self._tie_count = 0
         self._node_count = model.node_count if fields.mesh_path is None else _node_count_of(fields.mesh_path)
         self._out_count = self._node_count
         self._inputs = Inputs(self._node_count)
@@ -103,7 +105,7 @@ class Scene(Cuts):
                 step.
             displacement: `u(t)`, `[K, 3]`, mm, to start from; None takes the scene's own state. Not with instruments.
             time_s: the moment of the end of the step on a clock of your own, s, from which `present` counts.
-            loads: gravity, forces and pressure that act meanwhile; only in scenes with corrections.
+            loads: gravity, forces, pressure and ties that act meanwhile; only in scenes with corrections.
             out: `[n, 3]` to write to (n: K, or the region's count); None makes a new array.
 
         Returns:
@@ -119,6 +121,7 @@ class Scene(Cuts):
         if (status := _step(self._handle, at, place, length)) < 0:
             check(status)
         self._instrument_count = count
+        self._tie_count = 0 if loads is None else len(loads.ties)
         return result
 
     def step_field(
@@ -195,6 +198,7 @@ class Scene(Cuts):
         at, count, kept = self._inputs.place(instruments, contacts, collision, displacement, time_s, loads)
         check(lib.upt_scene_submit(self._handle, at))
         self._instrument_count = count
+        self._tie_count = 0 if loads is None else len(loads.ties)
 
     def poll(self) -> bool:
         """True when the submitted step has finished; raises its error, once."""

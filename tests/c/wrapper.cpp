@@ -98,6 +98,43 @@ static void haptics(const char *bundle) {
   EXPECT_TRUE(thrown([&] { other.render(pose); }) == UPT_ERR_STATE);
 }
 
+// A bed holds what a thread pulls at; what is pulled too hard breaks.
+static void ties(const char *bundle) {
+  upt::Model model = upt::Model::open(bundle);
+  upt_scene_options options = upt::make<upt_scene_options>();
+  options.corrections = 5;
+  upt::Scene scene(model, &options);
+  const std::vector<float> rest = model.positions();
+  const std::vector<std::uint32_t> domain = model.indices(UPT_SET_DOMAIN_NODES);
+  upt_bed bed = upt::make<upt_bed>();
+  bed.radius_mm = 15;
+  bed.stiffness = 20;
+  bed.break_mn = 1000;
+  std::copy_n(&rest[3 * domain[domain.size() / 2]], 3, bed.centre);
+  std::vector<upt_tie> ties = scene.bed(bed);
+  EXPECT_TRUE(ties.size() > 2);
+  upt_tie thread = upt::make<upt_tie>();
+  EXPECT(scene.tie_point(bed.centre, thread), UPT_OK);
+  thread.stiffness = 5;
+  thread.slack_mm = 1;
+  std::copy_n(bed.centre, 3, thread.place);
+  thread.place[2] += 3;
+  ties.push_back(thread);
+  std::vector<float> field(rest.size());
+  for (int step = 0; step < 5; step++) {
+    EXPECT(scene.step(upt::Input().ties(ties), field), UPT_OK);
+  }
+  const std::vector<upt_tie_reading> readings = scene.tie_readings(ties.size());
+  const upt_tie_reading &pulled = readings.back();
+  EXPECT_TRUE(pulled.force[2] > 0.1F && pulled.length_mm > 1 && pulled.broken == 0);
+  EXPECT_TRUE(std::fabs(pulled.force[2] - 5 * (pulled.length_mm - 1)) < 0.1F);
+  ties.back().break_mn = 0.5F * pulled.force[2];
+  EXPECT(scene.step(upt::Input().ties(ties), field), UPT_OK);
+  EXPECT_TRUE(scene.tie_readings(ties.size()).back().broke == 1);
+  ties[0].stiffness = -1;
+  EXPECT_TRUE(thrown([&] { scene.step(upt::Input().ties(ties), field); }) == UPT_ERR_ARGUMENT);
+}
+
 // A blade through the upper half of a body with corrections: outputs and the surface grow, and go
 // back.
 static void cuts(const char *bundle) {
@@ -198,6 +235,7 @@ int main(int argc, char **argv) {
   instruments(argv[2]);
   haptics(argv[2]);
   haptics(argv[3]);
+  ties(argv[3]);
   cuts(argv[3]);
   EXPECT(upt::shutdown(), UPT_OK);
   return expect_result("wrapper");

@@ -62,8 +62,9 @@ namespace Upt.Interop
                 fixed (float* c = input.Collision)
                 fixed (float* u = input.Displacement)
                 fixed (float* f = input.Forces)
+                fixed (upt_tie* t = input.Ties)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u, f, p);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t);
                     Status.Check(Native.upt_scene_present(scene, &raw, when, &shown, output, checked((ulong)floats)));
                 }
             }

@@ -79,9 +79,10 @@ namespace Upt.Interop
                 fixed (float* c = input.Collision)
                 fixed (float* u = input.Displacement)
                 fixed (float* f = input.Forces)
+                fixed (upt_tie* t = input.Ties)
                 fixed (float* o = output)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u, f, p);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t);
                     Status.Check(Native.upt_scene_step(scene, &raw, o, Length(output)));
                 }
             }
@@ -113,8 +114,9 @@ namespace Upt.Interop
                 fixed (float* c = input.Collision)
                 fixed (float* u = input.Displacement)
                 fixed (float* f = input.Forces)
+                fixed (upt_tie* t = input.Ties)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u, f, p);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t);
                     Status.Check(Native.upt_scene_submit(scene, &raw));
                 }
             }

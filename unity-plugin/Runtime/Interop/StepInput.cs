@@ -40,6 +40,10 @@ namespace Upt.Interop
         /// <summary>Pressure on parts of the surface, at most 32.</summary>
         public Pressure[] Pressures;
 
+        /// <summary>Ties of the tissue, at most 256, each with its <c>struct_size</c>: every tie in every step, in the same
+        /// order. Not in scenes without corrections.</summary>
+        public upt_tie[] Ties;
+
         /// <summary>Gravity at the end of the step, m/s², in the mesh's frame: x, y, z. Not in scenes without
         /// corrections.</summary>
         public (float X, float Y, float Z) Gravity;
@@ -89,7 +93,7 @@ namespace Upt.Interop
 
         /// <summary>As the library's struct, with the arrays where they are pinned.</summary>
         internal upt_input Raw(upt_instrument* instruments, uint* nodes, float* vectors, float* collision,
-                               float* displacement, float* forces, upt_pressure* pressures)
+                               float* displacement, float* forces, upt_pressure* pressures, upt_tie* ties)
         {
             upt_input raw = default(upt_input);
             raw.struct_size = (uint)sizeof(upt_input);
@@ -104,6 +108,8 @@ namespace Upt.Interop
             raw.forces = forces;
             raw.pressures = pressures;
             raw.pressure_count = (ulong)(Pressures == null ? 0 : Pressures.Length);
+            raw.ties = ties;
+            raw.tie_count = (ulong)(Ties == null ? 0 : Ties.Length);
             raw.gravity[0] = Gravity.X;
             raw.gravity[1] = Gravity.Y;
             raw.gravity[2] = Gravity.Z;
