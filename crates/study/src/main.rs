@@ -8,6 +8,7 @@ mod bench;
 mod compare;
 mod date;
 mod envelope;
+mod hang_report;
 mod haptics;
 mod load_report;
 mod processor_time;

@@ -21,6 +21,7 @@ pub mod baselines;
 pub mod contact;
 pub mod dataset;
 pub mod export;
+pub mod hang;
 #[cfg(feature = "linear")]
 pub mod linear;
 pub mod load_programmes;

@@ -26,6 +26,7 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 use tissue::mesh::Mesh;
 
+use crate::hang_report;
 use crate::load_report;
 use crate::shown;
 use crate::tools;
@@ -48,6 +49,17 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             sizes: options.load_sizes.sizes(),
             tool: options.tool,
             seed: options.seed,
+            bundles: &options.bundles,
+            corrections: &options.corrections,
+            threads,
+            markdown: &options.markdown,
+            json: options.json,
+        });
+    }
+    if options.hang > 0 {
+        return hang_report::report(&hang_report::Plan {
+            cases: options.hang,
+            sizes: options.bed_sizes(),
             bundles: &options.bundles,
             corrections: &options.corrections,
             threads,

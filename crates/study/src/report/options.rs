@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use tissue::hang::HangSizes;
 use tissue::load_programmes::LoadProgramme;
 use tissue::programmes::ToolProgramme;
 
@@ -20,6 +21,7 @@ use upt_cli::yardstick::cases::Split;
   upt-study report --shown 90 --tools data/brain-frames --split all --bundle onnx/brain-reduced --out target/shown
   upt-study report --load tilt,pulse,sag --bundle onnx/brain-coarse-reduced
   upt-study report --load pulse --tool press --bundle onnx/brain-coarse-reduced
+  upt-study report --hang 10 --bundle onnx/brain-coarse-reduced
   upt-study report --step-ms 10,20,25,50 --tools data/brain-frames --split all --bundle onnx/brain-reduced
 
 The command writes report.json, report.html and report.md (the table for a document of yours) to --out (with --tools: tools.json and tools.html), and prints the table.")]
@@ -60,6 +62,16 @@ pub struct Options {
     /// part between the markers `upt-study report --load`.
     #[arg(long, value_delimiter = ',', conflicts_with_all = ["trajectories", "data", "tools"])]
     pub(super) load: Vec<LoadProgramme>,
+    /// Measure so many cases of a bed of ties that a thread tears node by node, in the bundles of --bundle against the reference solver, which runs here. --markdown
+    /// replaces the part between the markers `upt-study report --hang`.
+    #[arg(long, value_name = "CASES", default_value_t = 0, hide_default_value = true, conflicts_with_all = ["trajectories", "data", "tools", "load"])]
+    pub(super) hang: usize,
+    /// With --hang: stiffness of the bed's ties together, N/m.
+    #[arg(long, default_value_t = HangSizes::default().stiffness)]
+    pub(super) bed_stiffness: f32,
+    /// With --hang: what the bed's ties bear together, mN.
+    #[arg(long, default_value_t = HangSizes::default().break_mn)]
+    pub(super) bed_break: f32,
     /// With --load: a tool that touches the body meanwhile.
     #[arg(long, value_parser = upt_cli::loads::programme(), requires = "load")]
     pub(super) tool: Option<ToolProgramme>,
@@ -114,6 +126,16 @@ pub struct Options {
     /// Print report.json instead of the table.
     #[arg(long)]
     pub(super) json: bool,
+}
+
+impl Options {
+    pub(super) fn bed_sizes(&self) -> HangSizes {
+        HangSizes {
+            stiffness: self.bed_stiffness,
+            break_mn: self.bed_break,
+            ..HangSizes::default()
+        }
+    }
 }
 
 /// All that this build has.
