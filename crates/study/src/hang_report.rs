@@ -99,7 +99,7 @@ pub fn report(plan: &Plan<'_>) -> Result<ExitCode> {
         false => print!("{}", table(&rows)),
     }
     for page in plan.markdown {
-        replace_between(page, "upt-study report --hang", &format!("\n{}", table(&rows)))?;
+        replace_between(page, "study report --hang", &format!("\n{}", table(&rows)))?;
     }
     Ok(ExitCode::SUCCESS)
 }

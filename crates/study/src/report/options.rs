@@ -63,7 +63,7 @@ pub struct Options {
     #[arg(long, value_delimiter = ',', conflicts_with_all = ["trajectories", "data", "tools"])]
     pub(super) load: Vec<LoadProgramme>,
     /// Measure so many cases of a bed of ties that a thread tears node by node, in the bundles of --bundle against the reference solver, which runs here. --markdown
-    /// replaces the part between the markers `upt-study report --hang`.
+    /// replaces the part between the markers `study report --hang`.
     #[arg(long, value_name = "CASES", default_value_t = 0, hide_default_value = true, conflicts_with_all = ["trajectories", "data", "tools", "load"])]
     pub(super) hang: usize,
     /// With --hang: stiffness of the bed's ties together, N/m.
