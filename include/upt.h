@@ -1916,12 +1916,12 @@ upt_status upt_scene_tie_readings(struct upt_scene *scene,
 /**
  * Finds the points of the tissue nearest to places, for ties: of the domain, the surface that instruments may touch, where it is in the last state.
  *
- * - `places`: `[count,3]`, mm, in the mesh's frame.
+ * - `places`: `[count,3]`, mm, in the mesh's frame; at most 1,000,000.
  * - `nodes`: `[count,3]`, `weights`: `[count,3]`: of each the nodes of a face and the weights of its corners, for `upt_tie`.
  *
  * Threads: any, at any time, even while a step runs.
- * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` for a bundle without a domain,
- * `UPT_ERR_UNSUPPORTED` for a cut body and in a build without feature "instruments"; nothing is written then.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` for too many and for a bundle without a domain,
+ * `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_UNSUPPORTED` for a cut body and in a build without feature "instruments"; nothing is written then.
  */
 upt_status upt_scene_tie_points(struct upt_scene *scene,
                                 const float *places,

@@ -12,6 +12,9 @@ use crate::features;
 use crate::scene::Bed;
 use ::contact::{End, Sample, Spring, Tie, Vector};
 
+/// Places that one call finds points for at most.
+const MOST_POINTS: u64 = 1_000_000;
+
 /// Copies what each tie of the last step does at its end.
 ///
 /// - `out`: `[count]`, in the order of the step's ties; set `struct_size` of every element.
@@ -57,12 +60,12 @@ pub unsafe extern "C" fn upt_scene_tie_readings(
 
 /// Finds the points of the tissue nearest to places, for ties: of the domain, the surface that instruments may touch, where it is in the last state.
 ///
-/// - `places`: `[count,3]`, mm, in the mesh's frame.
+/// - `places`: `[count,3]`, mm, in the mesh's frame; at most 1,000,000.
 /// - `nodes`: `[count,3]`, `weights`: `[count,3]`: of each the nodes of a face and the weights of its corners, for `upt_tie`.
 ///
 /// Threads: any, at any time, even while a step runs.
-/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` for a bundle without a domain,
-/// `UPT_ERR_UNSUPPORTED` for a cut body and in a build without feature "instruments"; nothing is written then.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` for too many and for a bundle without a domain,
+/// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_UNSUPPORTED` for a cut body and in a build without feature "instruments"; nothing is written then.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_tie_points(
     scene: *mut upt_scene,
@@ -73,7 +76,13 @@ pub unsafe extern "C" fn upt_scene_tie_points(
 ) -> upt_status {
     call_scene("upt_scene_tie_points", scene, |scene| {
         features::instruments()?;
-        let floats = count.saturating_mul(3);
+        if count > MOST_POINTS {
+            return fail(
+                UPT_ERR_ARGUMENT,
+                format!("count is {count}, must be at most {MOST_POINTS}"),
+            );
+        }
+        let floats = 3 * count;
         // SAFETY: the host passes that many elements, as the header asks.
         let places = unsafe { slice(places, floats, "places") }?;
         // SAFETY: the host passes room for that many elements, as the header asks.
