@@ -39,10 +39,14 @@ use look::MOST_ROWS;
 const WHAT: &str = "the contact of instruments";
 /// Parts of a step's way at most: of a thin tool that goes as far as one may.
 const MOST_PARTS: f32 = 80.0;
+/// Multiplications of a millisecond, nearly.
+const WORK_A_MS: u64 = 4_000_000;
 /// Work of the solves of a step at most, those of its substeps included, in multiplications: about five milliseconds.
 const STEP_WORK: u64 = 20_000_000;
 /// The same bound for a step in which no tool may lose its contact: a broad tool put into the tissue needs it to find its way out.
 const LONGEST_STEP_WORK: u64 = 3 * STEP_WORK;
+/// Work of a whole step at most, its iterations included, in which a tool leaps or lay in the tissue: about fifteen milliseconds.
+const LEAP_WORK: u64 = 60_000_000;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
 /// A tool that goes farther in a step is quick, mm.
@@ -64,6 +68,8 @@ pub struct ContactProblem {
     before: Vec<Pose>,
     /// Which of them were put there in this step.
     put: Vec<bool>,
+    /// One of those was elsewhere before.
+    has_leapt: bool,
     /// Which of them are so quick or thin that they could pass a sample between two searches: samples are searched along their whole way.
     swept: Vec<bool>,
     /// Which of those were clear of the tissue when the step began: their contact may be lost by the iterations.
@@ -101,6 +107,9 @@ pub struct ContactProblem {
     /// What the solves of this step took, multiplications that are left to them, and what the last of them left unsolved, mm.
     spent: Duration,
     work_left: u64,
+    /// The whole step's work is bounded, and the multiplications that are left to it.
+    is_bounded: bool,
+    step_work_left: u64,
     unsolved_mm: f32,
     /// A tool lay in the tissue when the step, or a part of it, began.
     pub lay_in_tissue: bool,
@@ -126,6 +135,7 @@ impl ContactProblem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
+            has_leapt: false,
             swept: memory::room(MAX_TOOLS, WHAT)?,
             may_lose: memory::room(MAX_TOOLS, WHAT)?,
             trusted: memory::room(MAX_TOOLS, WHAT)?,
@@ -149,6 +159,8 @@ impl ContactProblem {
             ways: memory::room(MAX_TOOLS, WHAT)?,
             spent: Duration::ZERO,
             work_left: STEP_WORK,
+            is_bounded: false,
+            step_work_left: u64::MAX,
             unsolved_mm: 0.0,
             until: None,
             lay_in_tissue: false,
@@ -220,6 +232,11 @@ impl ContactProblem {
             self.work_left = LONGEST_STEP_WORK;
         }
         self.work_left += self.tied.work();
+        self.is_bounded = self.has_leapt || self.lay_in_tissue;
+        self.step_work_left = match self.is_bounded {
+            true => LEAP_WORK,
+            false => u64::MAX,
+        };
         Ok(())
     }
 
@@ -256,6 +273,7 @@ impl ContactProblem {
         };
         self.before.clear();
         self.put.clear();
+        self.has_leapt = false;
         self.swept.clear();
         self.may_lose.clear();
         self.buried.clear();
@@ -265,6 +283,7 @@ impl ContactProblem {
             let from = moved.unwrap_or(tool.pose);
             self.before.push(from);
             self.put.push(moved.is_none());
+            self.has_leapt |= known.is_some() && moved.is_none();
             let (samples, mesh) = (&self.samples, &self.mesh);
             let buried = Buried::find(&tool.body, &from, samples, mesh, state);
             self.buried.push(buried);
@@ -324,9 +343,44 @@ impl ContactProblem {
         self.may_lose.contains(&true)
     }
 
+    /// Whether a tool that was elsewhere was put where it is in this step, without a way.
+    pub fn has_leapt(&self) -> bool {
+        self.has_leapt
+    }
+
+    /// Whether the whole step's work is bounded: a tool has leapt, or lay in the tissue when the step began.
+    pub fn is_bounded(&self) -> bool {
+        self.is_bounded
+    }
+
+    /// Takes what iterations have cost off the work of the step, in multiplications.
+    pub fn charge(&mut self, work: u64) {
+        self.step_work_left = self.step_work_left.saturating_sub(work);
+    }
+
+    /// Whether the step has so much work left.
+    pub fn affords(&self, work: u64) -> bool {
+        self.step_work_left >= work
+    }
+
+    /// Multiplications that the step's budget has time for.
+    fn work_in_time(&self) -> u64 {
+        let left = |until: Instant| until.saturating_duration_since(Instant::now());
+        self.until.map_or(u64::MAX, |until| {
+            WORK_A_MS * left(until).as_micros() as u64 / 1000
+        })
+    }
+
+    /// Whether the step's whole work is done, and what it left out is to be told.
+    pub fn is_cut_short(&self) -> bool {
+        self.step_work_left == 0
+    }
+
     /// Whether the solves of this step have taken their time.
     pub fn is_spent(&self) -> bool {
-        self.work_left == 0 || self.until.is_some_and(|until| Instant::now() >= until)
+        self.work_left == 0
+            || self.step_work_left == 0
+            || self.until.is_some_and(|until| Instant::now() >= until)
     }
 
     /// Sets when the step's budget of time ends. From then on its solves take the least work.

@@ -112,6 +112,7 @@ impl ContactProblem {
         if self.is_spent() {
             self.work_left = 0;
         }
+        let in_time = self.work_in_time();
         let is_short = self.work_left < SHORT_OF_WORK;
         let most = if is_short { FEW_ROWS } else { MOST_ROWS };
         self.look(state, part, false, most)?;
@@ -144,6 +145,7 @@ impl ContactProblem {
         let read = READ_WORK * (self.rows.len() * self.rows.len()) as u64;
         let found = LOOK_WORK * (self.samples.nodes().len() + self.found) as u64;
         self.work_left = self.work_left.saturating_sub(read + found);
+        self.step_work_left = self.step_work_left.saturating_sub(read + found);
         let moving = Moving {
             tools: &self.tools,
             before: &self.before,
@@ -184,14 +186,16 @@ impl ContactProblem {
                 false => limits.most_work.saturating_mul(LONGEST_LINEARISATION),
             };
             let limits = Limits {
-                most_work: most_work.min(self.work_left),
+                most_work: most_work.min(self.work_left).min(in_time),
                 ..limits
             };
             let outcome = self
                 .sweeps
                 .solve(w, &self.contacts, &mut self.forces, limits);
             let measured = MEASURE_WORK * self.rows.len() as u64;
-            self.work_left = self.work_left.saturating_sub(outcome.work + measured);
+            let taken = outcome.work + measured;
+            self.work_left = self.work_left.saturating_sub(taken);
+            self.step_work_left = self.step_work_left.saturating_sub(taken);
             self.unsolved_mm = match outcome.converged {
                 true => 0.0,
                 false => outcome.change_mm,

@@ -23,6 +23,8 @@ pub(in crate::corrections) const LEVELS: usize = 4;
 const WIDER: [f32; LEVELS] = [1.0, 1.5, 2.25, f32::INFINITY];
 /// A set is too narrow where the far nodes are smoothed by more than this part of how far the touched ones have been pushed.
 const FAR_PART: f32 = 6e-5;
+/// A level beyond the first is not taken with more nodes than these, but the widest below it that has fewer: an iteration costs what is near.
+const MOST_NODES: usize = 4500;
 /// Where a larger part of the nodes would be near, all are, and so they are in a body of fewer nodes: whole, it costs no more than its modes do.
 const LARGEST_PART: f32 = 0.5;
 const FEWEST_NODES: usize = 1000;
@@ -159,10 +161,7 @@ impl NearSet {
         for &node in &self.nodes {
             self.places[node as usize] = NONE;
         }
-        let reach = match self.places.len() < FEWEST_NODES {
-            true => f32::MAX,
-            false => WIDER[level] * REACH_MM.max(REACH_EDGES * far.edge_mm),
-        };
+        let reach = self.reach(far, rest, level);
         self.take_elements(env, far, rest, reach)?;
         let most = LARGEST_PART * self.places.len() as f32;
         if reach < f32::MAX && self.nodes.len() as f32 > most {
@@ -199,6 +198,21 @@ impl NearSet {
             self.ranges.push(ends[0] as usize..ends[1] as usize);
         }
         memory::replace(&mut self.centres, &self.chosen, WHAT)
+    }
+
+    /// How far from the chosen centres nodes are near, mm.
+    fn reach(&self, far: &FarField, rest: &[f32], level: usize) -> f32 {
+        if self.places.len() < FEWEST_NODES {
+            return f32::MAX;
+        }
+        let reach = |level: usize| WIDER[level] * REACH_MM.max(REACH_EDGES * far.edge_mm);
+        let fits = |level: &usize| {
+            let reach = reach(*level);
+            let nodes = 0..self.places.len() as u32;
+            let near = nodes.filter(|node| is_by(rest, &self.chosen, *node, reach));
+            near.take(MOST_NODES + 1).count() <= MOST_NODES
+        };
+        reach((1..=level).rev().find(fits).unwrap_or(0))
     }
 
     /// Marks the nodes of the core as reached, and no others that are near.

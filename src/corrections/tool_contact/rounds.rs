@@ -53,7 +53,9 @@ impl ImplicitSolver {
             self.improve_round(context, input, problem, at, (&mut made, report))?;
             self.end_round(context, input, problem, at)?;
             let most = input.enough.iterations;
-            if made.is_enough || made.iterations >= most || problem.is_spent() {
+            let again = self.local.as_ref().map_or(0, |local| local.begin_work());
+            let affords = !problem.is_spent() && problem.affords(again);
+            if made.is_enough || made.iterations >= most || !affords {
                 break;
             }
             self.evaluate(context, input, at, report)?;
@@ -65,7 +67,10 @@ impl ImplicitSolver {
         report.residual = (made.size / made.start.max(f64::MIN_POSITIVE)) as f32;
         if let Some(local) = &self.local {
             report.far_mm = local.far_mm;
-            report.level = local.next_level(at.u);
+            // What a leap does to the far nodes says nothing of the reach.
+            if !problem.has_leapt() {
+                report.level = local.next_level(at.u);
+            }
         }
         Ok(made.size)
     }
@@ -135,7 +140,12 @@ impl ImplicitSolver {
             u: at.u,
             residual: at.g,
         };
-        local.begin(&mut step, base)
+        let generation = local.factor.generation;
+        let begun = local.begin(&mut step, base);
+        if local.factor.generation != generation {
+            problem.charge(local.begin_work());
+        }
+        begun
     }
 
     /// The state of the iterations into `at`, whose residual is not known then.
