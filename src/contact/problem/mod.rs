@@ -11,11 +11,10 @@ mod look;
 mod solve;
 mod tie_set;
 mod tied;
+mod work;
 
 use std::sync::Arc;
 use std::time::Duration;
-
-use crate::clock::Instant;
 
 use ::contact::grasp::REACH_MM;
 use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector};
@@ -35,18 +34,11 @@ use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
 use look::MOST_ROWS;
+use work::Work;
 
 const WHAT: &str = "the contact of instruments";
 /// Parts of a step's way at most: of a thin tool that goes as far as one may.
 const MOST_PARTS: f32 = 80.0;
-/// Multiplications of a millisecond, nearly.
-const WORK_A_MS: u64 = 4_000_000;
-/// Work of the solves of a step at most, those of its substeps included, in multiplications: about five milliseconds.
-const STEP_WORK: u64 = 20_000_000;
-/// The same bound for a step in which no tool may lose its contact: a broad tool put into the tissue needs it to find its way out.
-const LONGEST_STEP_WORK: u64 = 3 * STEP_WORK;
-/// Work of a whole step at most, its iterations included, in which a tool leaps or lay in the tissue: about fifteen milliseconds.
-const LEAP_WORK: u64 = 60_000_000;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
 /// A tool that goes farther in a step is quick, mm.
@@ -104,17 +96,12 @@ pub struct ContactProblem {
     guessed: Vec<Force>,
     /// Where the tools came from, while they take another way.
     ways: Vec<(Pose, bool, Option<Buried>)>,
-    /// What the solves of this step took, multiplications that are left to them, and what the last of them left unsolved, mm.
+    /// What the solves of this step took, what is left to it, and what the last of them left unsolved, mm.
     spent: Duration,
-    work_left: u64,
-    /// The whole step's work is bounded, and the multiplications that are left to it.
-    is_bounded: bool,
-    step_work_left: u64,
+    work: Work,
     unsolved_mm: f32,
     /// A tool lay in the tissue when the step, or a part of it, began.
     pub lay_in_tissue: bool,
-    /// When the step's budget ends.
-    until: Option<Instant>,
     columns: Vec<u32>,
     change: Vec<f32>,
     nodes: Vec<u32>,
@@ -158,11 +145,8 @@ impl ContactProblem {
             guessed: memory::room(room, WHAT)?,
             ways: memory::room(MAX_TOOLS, WHAT)?,
             spent: Duration::ZERO,
-            work_left: STEP_WORK,
-            is_bounded: false,
-            step_work_left: u64::MAX,
+            work: Work::new(),
             unsolved_mm: 0.0,
-            until: None,
             lay_in_tissue: false,
             columns: memory::room(dofs, WHAT)?,
             change: memory::room(dofs, WHAT)?,
@@ -223,20 +207,11 @@ impl ContactProblem {
         start: &[f32],
     ) -> Result<()> {
         self.spent = Duration::ZERO;
-        self.work_left = STEP_WORK;
         self.unsolved_mm = 0.0;
-        self.until = None;
         self.lay_in_tissue = false;
         self.enter(tools, ties, rest, start)?;
-        if !self.may_lose() {
-            self.work_left = LONGEST_STEP_WORK;
-        }
-        self.work_left += self.tied.work();
-        self.is_bounded = self.has_leapt || self.lay_in_tissue;
-        self.step_work_left = match self.is_bounded {
-            true => LEAP_WORK,
-            false => u64::MAX,
-        };
+        let is_bounded = self.has_leapt || self.lay_in_tissue;
+        self.work = Work::of(self.may_lose(), is_bounded, self.tied.work());
         Ok(())
     }
 
@@ -346,46 +321,6 @@ impl ContactProblem {
     /// Whether a tool that was elsewhere was put where it is in this step, without a way.
     pub fn has_leapt(&self) -> bool {
         self.has_leapt
-    }
-
-    /// Whether the whole step's work is bounded: a tool has leapt, or lay in the tissue when the step began.
-    pub fn is_bounded(&self) -> bool {
-        self.is_bounded
-    }
-
-    /// Takes what iterations have cost off the work of the step, in multiplications.
-    pub fn charge(&mut self, work: u64) {
-        self.step_work_left = self.step_work_left.saturating_sub(work);
-    }
-
-    /// Whether the step has so much work left.
-    pub fn affords(&self, work: u64) -> bool {
-        self.step_work_left >= work
-    }
-
-    /// Multiplications that the step's budget has time for.
-    fn work_in_time(&self) -> u64 {
-        let left = |until: Instant| until.saturating_duration_since(Instant::now());
-        self.until.map_or(u64::MAX, |until| {
-            WORK_A_MS * left(until).as_micros() as u64 / 1000
-        })
-    }
-
-    /// Whether the step's whole work is done, and what it left out is to be told.
-    pub fn is_cut_short(&self) -> bool {
-        self.step_work_left == 0
-    }
-
-    /// Whether the solves of this step have taken their time.
-    pub fn is_spent(&self) -> bool {
-        self.work_left == 0
-            || self.step_work_left == 0
-            || self.until.is_some_and(|until| Instant::now() >= until)
-    }
-
-    /// Sets when the step's budget of time ends. From then on its solves take the least work.
-    pub fn end_by(&mut self, until: Option<Instant>) {
-        self.until = until;
     }
 
     /// Whether forces were at work at the end of the last step.

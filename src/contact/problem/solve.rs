@@ -5,7 +5,7 @@ use crate::clock::Instant;
 use ::contact::{Limits, Rows, Vector, Whole};
 
 use super::look::MOST_ROWS;
-use super::{ContactProblem, STEP_WORK, WHAT};
+use super::{ContactProblem, WHAT};
 use crate::contact::Compliance;
 use crate::contact::past::Force;
 use crate::contact::rows::Moving;
@@ -23,8 +23,6 @@ const LONGEST_LINEARISATION: u64 = 15;
 const LOOK_WORK: u64 = 60;
 const MEASURE_WORK: u64 = 1000;
 const READ_WORK: u64 = 80;
-/// Those of a step that are left when its solves begin to take fewer samples.
-const SHORT_OF_WORK: u64 = STEP_WORK / 2;
 /// Samples of a solve that is short of work.
 const FEW_ROWS: usize = 64;
 
@@ -109,11 +107,7 @@ impl ContactProblem {
     ) -> Result<Change<'_>> {
         let start = Instant::now();
         memory::replace(&mut self.kept, &self.next.forces, WHAT)?;
-        if self.is_spent() {
-            self.work_left = 0;
-        }
-        let in_time = self.work_in_time();
-        let is_short = self.work_left < SHORT_OF_WORK;
+        let is_short = self.work.begin_solve();
         let most = if is_short { FEW_ROWS } else { MOST_ROWS };
         self.look(state, part, false, most)?;
         self.fit()?;
@@ -144,8 +138,7 @@ impl ContactProblem {
         };
         let read = READ_WORK * (self.rows.len() * self.rows.len()) as u64;
         let found = LOOK_WORK * (self.samples.nodes().len() + self.found) as u64;
-        self.work_left = self.work_left.saturating_sub(read + found);
-        self.step_work_left = self.step_work_left.saturating_sub(read + found);
+        self.work.take(read + found);
         let moving = Moving {
             tools: &self.tools,
             before: &self.before,
@@ -186,16 +179,14 @@ impl ContactProblem {
                 false => limits.most_work.saturating_mul(LONGEST_LINEARISATION),
             };
             let limits = Limits {
-                most_work: most_work.min(self.work_left).min(in_time),
+                most_work: most_work.min(self.work.for_solve()),
                 ..limits
             };
             let outcome = self
                 .sweeps
                 .solve(w, &self.contacts, &mut self.forces, limits);
             let measured = MEASURE_WORK * self.rows.len() as u64;
-            let taken = outcome.work + measured;
-            self.work_left = self.work_left.saturating_sub(taken);
-            self.step_work_left = self.step_work_left.saturating_sub(taken);
+            self.work.take(outcome.work + measured);
             self.unsolved_mm = match outcome.converged {
                 true => 0.0,
                 false => outcome.change_mm,
