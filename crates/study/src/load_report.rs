@@ -22,6 +22,7 @@ use upt::{
 };
 
 use crate::quantile::median;
+use crate::table::{Column, Table, or_dash};
 use upt_cli::bundle_folder::BundleFolder;
 use upt_cli::effort::Effort;
 use upt_cli::marks::replace_between;
@@ -92,13 +93,14 @@ pub fn report(plan: &Plan<'_>) -> Result<ExitCode> {
             }
         }
     }
+    let table = Table::of(&[0, 1, 2], &COLUMNS, &rows).markdown();
     if plan.json {
         println!("{}", serde_json::to_string_pretty(&rows)?);
     } else {
-        print!("{}", table(&rows));
+        print!("{table}");
     }
     for page in plan.markdown {
-        replace_between(page, "study report --load", &format!("\n{}", table(&rows)))?;
+        replace_between(page, "study report --load", &format!("\n{table}"))?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -284,25 +286,17 @@ fn tools(truth: &Trajectory) -> Result<Vec<Tool>> {
     made.collect()
 }
 
-fn table(rows: &[Row]) -> String {
-    let mut text = String::from(
-        "| bundle | load | tool | k | farthest, mm | MSE, mm² (median) | worst | force error | smallest det F | ms a step |\n|---|---|---|---:|---:|---:|---:|---:|---:|---:|\n",
-    );
-    for row in rows {
-        let force = row.force_error;
-        let force = force.map_or("-".into(), |error| format!("{:.1} %", 100.0 * error));
-        text += &format!(
-            "| `{}` | {} | {} | {} | {:.2} | {:.2e} | {:.2e} | {force} | {:.2} | {:.1} |\n",
-            row.bundle,
-            row.load,
-            row.tool,
-            row.corrections,
-            row.farthest_mm,
-            row.mse,
-            row.worst_mse,
-            row.smallest_det,
-            row.step_ms,
-        );
-    }
-    text
-}
+const COLUMNS: [Column<Row>; 10] = [
+    ("bundle", |row| format!("`{}`", row.bundle)),
+    ("load", |row| row.load.into()),
+    ("tool", |row| row.tool.into()),
+    ("k", |row| row.corrections.clone()),
+    ("farthest, mm", |row| format!("{:.2}", row.farthest_mm)),
+    ("MSE, mm² (median)", |row| format!("{:.2e}", row.mse)),
+    ("worst", |row| format!("{:.2e}", row.worst_mse)),
+    ("force error", |row| {
+        or_dash(row.force_error, |error| format!("{:.1} %", 100.0 * error))
+    }),
+    ("smallest det F", |row| format!("{:.2}", row.smallest_det)),
+    ("ms a step", |row| format!("{:.1}", row.step_ms)),
+];

@@ -17,6 +17,7 @@ mod report;
 mod shown;
 mod soak;
 mod stress;
+mod table;
 mod tools;
 
 use std::process::ExitCode;

@@ -6,6 +6,7 @@ use super::observer::{ForceError, Moment, Series, Share};
 use super::rank::spearman;
 use super::replay::Group;
 use super::{CASE, HELD, Release};
+use crate::table::Table;
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0f64), |(sum, count), v| (sum + v, count + 1.0));
@@ -25,40 +26,38 @@ fn percent(shares: impl Iterator<Item = Share>) -> f64 {
     100.0 * (sum.wrong / sum.all.max(f64::MIN_POSITIVE)).sqrt()
 }
 
-/// Errors of the nodal forces and of their sum, by the scene and by the elements.
-const FORCES: &str = "force: nodes, sum | by elements: nodes, sum";
-
-/// The two cells under [`FORCES`].
-fn forces(moments: &[Moment]) -> String {
+/// The two cells `force: nodes, sum` and `by elements: nodes, sum`.
+fn forces(moments: &[Moment]) -> [String; 2] {
     let cell = |error: fn(&Moment) -> Option<ForceError>| {
         let errors = || moments.iter().filter_map(error);
         let nodal = percent(errors().map(|e| e.nodal));
         let sum = percent(errors().map(|e| e.sum));
         format!("{nodal:.0}, {sum:.0} %")
     };
-    format!("{} | {}", cell(|m| m.force), cell(|m| m.element_force))
+    [cell(|m| m.force), cell(|m| m.element_force)]
 }
 
 /// A row a scheme; true when the later half of the cases is no worse than 1.5 times the first.
 pub fn schemes(text: &mut String, moments: &[Moment]) -> bool {
-    let _ = writeln!(
-        text,
-        "| steps | scheme | MSE, mm² | largest error, mm | largest \\|u\\| of the solver, mm | of the bundle, mm | {FORCES} |\n|---|---|---|---|---|---|---|---|"
+    let mut table = Table::new(
+        &[0],
+        "steps; scheme; MSE, mm²; largest error, mm; largest |u| of the solver, mm; of the bundle, mm; \
+         force: nodes, sum; by elements: nodes, sum",
     );
     for (case, block) in moments.chunks(CASE).enumerate() {
-        let _ = writeln!(
-            text,
-            "| {} to {} | {} | {:.4} | {:.2} | {:.2} | {:.2} | {} |",
-            case * CASE + 1,
-            case * CASE + block.len(),
-            case % 5 + 1,
-            mean(block.iter().map(|m| m.mse)),
-            most(block, |m| m.largest_error),
-            most(block, |m| m.true_size),
-            most(block, |m| m.size),
-            forces(block),
-        );
+        let [force, element_force] = forces(block);
+        table.push([
+            format!("{} to {}", case * CASE + 1, case * CASE + block.len()),
+            (case % 5 + 1).to_string(),
+            format!("{:.4}", mean(block.iter().map(|m| m.mse))),
+            format!("{:.2}", most(block, |m| m.largest_error)),
+            format!("{:.2}", most(block, |m| m.true_size)),
+            format!("{:.2}", most(block, |m| m.size)),
+            force,
+            element_force,
+        ]);
     }
+    text.push_str(&table.markdown());
     let half = moments.len() / CASE / 2 * CASE;
     let first = mean(moments[..half].iter().map(|m| m.mse));
     let later = mean(moments[half..].iter().map(|m| m.mse));
@@ -89,25 +88,26 @@ pub fn release(text: &mut String, release: &Release) {
 
 /// Cases from disk, a row a scheme.
 pub fn cases(text: &mut String, inside: &[Group], outside: &[Group]) {
-    let _ = writeln!(
-        text,
-        "| held-out cases | steps | MSE, mm² | largest error, mm | steps with a flag | refused | {FORCES} |\n|---|---|---|---|---|---|---|---|"
+    let mut table = Table::new(
+        &[0],
+        "held-out cases; steps; MSE, mm²; largest error, mm; steps with a flag; refused; \
+         force: nodes, sum; by elements: nodes, sum",
     );
     for group in inside.iter().chain(outside) {
         let moments = &group.moments;
-        let _ = writeln!(
-            text,
-            "| {} of scheme {} | {} | {:.4} | {:.2} | {} | {} | {} |",
-            group.cases,
-            group.scheme,
-            moments.len(),
-            mean(moments.iter().map(|m| m.mse)),
-            most(moments, |m| m.largest_error),
-            moments.iter().filter(|m| m.flags != 0).count(),
-            moments.iter().filter(|m| m.refused).count(),
-            forces(moments),
-        );
+        let [force, element_force] = forces(moments);
+        table.push([
+            format!("{} of scheme {}", group.cases, group.scheme),
+            moments.len().to_string(),
+            format!("{:.4}", mean(moments.iter().map(|m| m.mse))),
+            format!("{:.2}", most(moments, |m| m.largest_error)),
+            moments.iter().filter(|m| m.flags != 0).count().to_string(),
+            moments.iter().filter(|m| m.refused).count().to_string(),
+            force,
+            element_force,
+        ]);
     }
+    text.push_str(&table.markdown());
     text.push('\n');
 }
 
@@ -133,22 +133,20 @@ pub fn ranks(text: &mut String, inside: &[Moment], outside: &[Moment]) {
     let _ = writeln!(
         text,
         "False alarms: {alarms} of {steps} steps inside the envelope. Rank correlation (Spearman) of a warning with the largest \
-         error of the step, over {} steps in contact inside, {} outside, and both:\n\n| warning | inside | outside | both |\n|---|---|---|---|",
+         error of the step, over {} steps in contact inside, {} outside, and both:\n",
         inside.len(),
         outside.len()
     );
+    let mut table = Table::new(&[0], "warning; inside; outside; both");
     for (name, warning) in warnings {
-        let _ = write!(text, "| {name} |");
-        for set in [&inside, &outside, &both] {
+        let rank = |set: &[Moment]| {
             let a: Vec<f64> = set.iter().map(warning).collect();
             let b: Vec<f64> = set.iter().map(|m| m.largest_error).collect();
-            let _ = match spearman(&a, &b) {
-                Some(rank) => write!(text, " {rank:.2} |"),
-                None => write!(text, " constant |"),
-            };
-        }
-        text.push('\n');
+            spearman(&a, &b).map_or_else(|| "constant".into(), |rank| format!("{rank:.2}"))
+        };
+        table.push([name.into(), rank(&inside), rank(&outside), rank(&both)]);
     }
+    text.push_str(&table.markdown());
     let error = |alarmed: bool| {
         let set = both.iter().filter(|m| m.alarmed() == alarmed);
         mean(set.map(|m| m.largest_error))

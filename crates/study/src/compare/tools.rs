@@ -11,6 +11,7 @@ use tissue::schemes::FRAME_S;
 use tissue::solver::Solver;
 
 use crate::bench::{Bench, names};
+use crate::table::{Column, Table};
 use upt_cli::host;
 use upt_cli::plot::label;
 use upt_cli::progress;
@@ -99,24 +100,23 @@ fn settle(solver: &mut Solver, driver: &mut Driver, field: &mut [[f32; 3]]) -> R
     Ok(())
 }
 
+const COLUMNS: [Column<Driven>; 6] = [
+    ("programme of tools", |one| one.programme.to_string()),
+    ("MSE, mm²", |one| label(mean(&one.mse))),
+    ("largest error, mm", |one| {
+        format!("{:.2}", one.largest_error)
+    }),
+    ("force", |one| {
+        let error = (one.wrong / one.all.max(f64::MIN_POSITIVE)).sqrt();
+        format!("{:.1} %", 100.0 * error)
+    }),
+    ("smallest det F", |one| format!("{:.2}", one.det)),
+    ("flags", |one| names(one.flags)),
+];
+
 /// A row a programme, then the first half of the cases against the second; true where the second is no worse than twice the first.
 pub fn table(text: &mut String, driven: &[Driven]) -> bool {
-    let _ = writeln!(
-        text,
-        "| programme of tools | MSE, mm² | largest error, mm | force | smallest det F | flags |\n|---|---|---|---|---|---|"
-    );
-    for one in driven {
-        let _ = writeln!(
-            text,
-            "| {} | {} | {:.2} | {:.1} % | {:.2} | {} |",
-            one.programme,
-            label(mean(&one.mse)),
-            one.largest_error,
-            100.0 * (one.wrong / one.all.max(f64::MIN_POSITIVE)).sqrt(),
-            one.det,
-            names(one.flags)
-        );
-    }
+    text.push_str(&Table::of(&[0, 5], &COLUMNS, driven).markdown());
     // Medians: a slip-off to another place of the tissue is one case's, not growth.
     let middle = |half: &[Driven]| {
         let mut values: Vec<f64> = half.iter().map(|one| mean(&one.mse)).collect();

@@ -4,6 +4,7 @@ use tissue::programmes::ToolProgramme;
 
 use super::limits::{Limits, Tried};
 use crate::quantile::quantile;
+use crate::table::{Table, or_dash};
 use upt_cli::counted::counted;
 use upt_cli::effort::Effort;
 use upt_cli::plot::label;
@@ -44,7 +45,7 @@ pub fn markdown(
     let mut out = format!(
         "`{bundle}` with k = {corrections} is good for {} of half the smallest extent (the radius of a rod) {low:.1} to {high:.1} mm that \
          push the tissue up to {:.1} mm and move at up to {:.0} mm/s: {} of {inside} such cases stay below {} mm² without an inverted element \
-         ({} measured).\n\n| cases | number | MSE median, mm² | worst | force, median | good |\n|---|---:|---:|---:|---:|---:|\n",
+         ({} measured).\n\n",
         match limits.count {
             1 => "one tool".to_owned(),
             count => format!("up to {count} tools"),
@@ -55,6 +56,8 @@ pub fn markdown(
         label(limit_mm2),
         counted(cases.len(), "case")
     );
+    let titles = "cases; number; MSE median, mm²; worst; force, median; good";
+    let mut table = Table::new(&[0], titles);
     let mut add = |name: &str, own: Vec<&Tried>| {
         if own.is_empty() {
             return;
@@ -65,17 +68,16 @@ pub fn markdown(
         };
         let mse = sorted(own.iter().map(|case| case.mse_mm2).collect());
         let force = sorted(own.iter().filter_map(|case| case.force_error).collect());
-        let force = match force.is_empty() {
-            true => "-".to_owned(),
-            false => format!("{:.1} %", 100.0 * quantile(&force, 0.5)),
-        };
+        let force = (!force.is_empty()).then(|| 100.0 * quantile(&force, 0.5));
         let good = own.iter().filter(|case| case.good).count();
-        out += &format!(
-            "| {name} | {} | {} | {} | {force} | {good} |\n",
-            own.len(),
+        table.push([
+            name.into(),
+            own.len().to_string(),
             label(quantile(&mse, 0.5)),
             label(mse[mse.len() - 1]),
-        );
+            or_dash(force, |force| format!("{force:.1} %")),
+            good.to_string(),
+        ]);
     };
     add(
         "inside the limits",
@@ -103,6 +105,7 @@ pub fn markdown(
         );
         add(&row, own);
     }
+    out += &table.markdown();
     if !unknown.is_empty() {
         out += &format!(
             "\nNot measured: {}; `upt dataset --tools {}` makes cases.\n",

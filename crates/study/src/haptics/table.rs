@@ -7,6 +7,7 @@ use contact::Vector;
 use super::play::Track;
 use super::truth::{FRAME_S, Forces, resample};
 use crate::report::memory::Resident;
+use crate::table::{Column, Table};
 use upt_cli::plot::{Axes, Scale, colour};
 
 /// Samples of a mean, ms.
@@ -56,19 +57,18 @@ impl Against {
         }
     }
 
-    fn row(&self, name: &str) -> String {
-        let percent = |square: f64| 100.0 * (square / self.size).sqrt();
+    fn row(&self, name: &str) -> [String; 7] {
+        let percent = |square: f64| format!("{:.1} %", 100.0 * (square / self.size).sqrt());
         let [felt, real] = self.jumps;
-        format!(
-            "| {name} | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {:.2} / {:.2} | {:.2} |\n",
+        [
+            name.into(),
             percent(self.off),
             percent(self.mean_off),
             percent(self.noise),
             percent(self.held),
-            1e3 * felt,
-            1e3 * real,
-            felt / real
-        )
+            format!("{:.2} / {:.2}", 1e3 * felt, 1e3 * real),
+            format!("{:.2}", felt / real),
+        ]
     }
 }
 
@@ -236,34 +236,42 @@ fn simulated(seconds: f64) -> String {
     }
 }
 
+const COLUMNS: [Column<Row>; 6] = [
+    ("gesture", |row| row.name.into()),
+    ("largest force, mN", |row| format!("{:.0}", 1e3 * row.peak)),
+    ("largest change in 1 ms, mN", |row| {
+        format!("{:.2}", 1e3 * row.jump)
+    }),
+    ("energy given, µJ", |row| {
+        format!("{:.3}", 1e6 * row.given_j)
+    }),
+    ("without the controller (first round), µJ", |row| {
+        format!("{:.3}", 1e6 * row.bare_j)
+    }),
+    ("damped, part of touching", |row| {
+        let damped = row.damped as f64 / row.touching.max(1) as f64;
+        format!("{:.1} %", 100.0 * damped)
+    }),
+];
+
 /// The tables as Markdown.
 pub fn markdown(rows: &[Row], account: &Account, compared: bool) -> String {
-    let mut text = String::from(
-        "| gesture | largest force, mN | largest change in 1 ms, mN | energy given, µJ | without the controller (first round), µJ | damped, part of touching |\n|---|---|---|---|---|---|\n",
-    );
-    for row in rows {
-        let damped = row.damped as f64 / row.touching.max(1) as f64;
-        let _ = writeln!(
-            text,
-            "| {} | {:.0} | {:.2} | {:.3} | {:.3} | {:.1} % |",
-            row.name,
-            1e3 * row.peak,
-            1e3 * row.jump,
-            1e6 * row.given_j,
-            1e6 * row.bare_j,
-            100.0 * damped
-        );
-    }
+    let mut text = Table::of(&[0], &COLUMNS, rows).markdown();
     if compared {
-        text += "\n| against the solver | force error, relative L2 | of means over 11 ms | the solver's own noise about those | the last step's force held | largest change in 1 ms: rendered / solver, mN | ratio |\n|---|---|---|---|---|---|---|\n";
+        let mut table = Table::new(
+            &[0],
+            "against the solver; force error, relative L2; of means over 11 ms; the solver's own noise about those; \
+             the last step's force held; largest change in 1 ms: rendered / solver, mN; ratio",
+        );
         let mut all = Against::default();
         for row in rows {
             if let Some(against) = &row.against {
-                text += &against.row(row.name);
+                table.push(against.row(row.name));
                 all = all.join(against);
             }
         }
-        text += &all.row("all gestures together");
+        table.push(all.row("all gestures together"));
+        text += &format!("\n{}", table.markdown());
     }
     let calls = &account.calls;
     let _ = write!(

@@ -1,22 +1,19 @@
 //! The rows as a table: for the terminal, and for a document.
 
 use super::row::Row;
+use crate::table::{Column, Table, or_dash};
 use upt_cli::plot::label;
 
-/// What a column shows of a row.
-type Cell = fn(&Row) -> String;
-
 /// Column titles and the cell of a row.
-pub const COLUMNS: &[(&str, Cell)] = &[
+pub const COLUMNS: &[Column<Row>] = &[
     ("method", |row| row.family()),
     ("configuration", |row| row.variant()),
     ("MSE mm²", |row| spread(row.mse_mm2, row.mse_std)),
     ("rel. L2", |row| label(row.relative_l2)),
     ("Hausdorff mm", |row| {
-        row.hausdorff_mm.map_or_else(
-            || "-".into(),
-            |mean| spread(mean, row.hausdorff_std.unwrap_or(0.0)),
-        )
+        or_dash(row.hausdorff_mm, |mean| {
+            spread(mean, row.hausdorff_std.unwrap_or(0.0))
+        })
     }),
     ("max mm", |row| spread(row.max_mm, row.max_std)),
     ("p50 ms", |row| label(row.ms_p50)),
@@ -26,9 +23,7 @@ pub const COLUMNS: &[(&str, Cell)] = &[
     ("first ms", |row| label(row.first_step_ms)),
     ("load s", |row| label(row.load_s)),
     ("MB", |row| label(row.memory_mb)),
-    ("vs f32 mm", |row| {
-        row.deviation.map_or_else(|| "-".into(), label)
-    }),
+    ("vs f32 mm", |row| or_dash(row.deviation, label)),
 ];
 
 fn spread(mean: f64, deviation: f64) -> String {
@@ -37,63 +32,33 @@ fn spread(mean: f64, deviation: f64) -> String {
 
 /// The rows for the terminal, names to the left, figures to the right.
 pub fn text(rows: &[&Row]) -> String {
-    let cells = |row: &&Row| COLUMNS.iter().map(|column| (column.1)(row)).collect();
-    let head = COLUMNS.iter().map(|column| column.0.to_owned()).collect();
-    aligned(head, rows.iter().map(cells), &[0, 1])
+    Table::of(&[0, 1], COLUMNS, rows.iter().copied()).text()
 }
 
-/// Lines of cells as aligned columns; those that `left` counts begin at the left, the others end at the right.
-pub fn aligned(
-    head: Vec<String>,
-    rows: impl Iterator<Item = Vec<String>>,
-    left: &[usize],
-) -> String {
-    let lines: Vec<Vec<String>> = std::iter::once(head).chain(rows).collect();
-    let width = |column: usize| {
-        let widths = lines.iter().map(|line| line[column].chars().count());
-        widths.max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..lines[0].len()).map(width).collect();
-    let mut out = String::new();
-    for line in &lines {
-        let cells = line
-            .iter()
-            .zip(&widths)
-            .enumerate()
-            .map(|(at, (cell, width))| match left.contains(&at) {
-                true => format!("{cell:<width$}"),
-                false => format!("{cell:>width$}"),
-            });
-        let cells: Vec<String> = cells.collect();
-        out.push_str(cells.join("  ").trim_end());
-        out.push('\n');
+const DOCUMENT: [Column<Row>; 6] = [
+    ("method", in_words),
+    ("threads", |row| row.threads.to_string()),
+    ("MSE, mm²", |row| error(row, row.mse_mm2, row.mse_std)),
+    ("largest error, mm", |row| {
+        error(row, row.max_mm, row.max_std)
+    }),
+    ("ms a step (median)", |row| figure(row.ms_p50)),
+    ("p99", |row| figure(row.ms_p99)),
+];
+
+/// Mean and deviation over the cases; the reference has none.
+fn error(row: &Row, mean: f64, deviation: f64) -> String {
+    match row.method.as_str() {
+        "TLED" => "0".to_owned(),
+        _ => format!("{} ± {}", figure(mean), figure(deviation)),
     }
-    out
 }
 
-/// A table of Markdown, rows by ascending time. Errors are mean and deviation over the cases; the reference has none.
+/// A table of Markdown, rows by ascending time.
 pub fn markdown(rows: &[&Row]) -> String {
-    let mut out = String::from(
-        "| method | threads | MSE, mm² | largest error, mm | ms a step (median) | p99 |\n|---|---:|---:|---:|---:|---:|\n",
-    );
     let mut rows = rows.to_vec();
     rows.sort_by(|a, b| a.ms_p50.total_cmp(&b.ms_p50));
-    for row in rows {
-        let error = |mean: f64, deviation: f64| match row.method.as_str() {
-            "TLED" => "0".to_owned(),
-            _ => format!("{} ± {}", figure(mean), figure(deviation)),
-        };
-        out.push_str(&format!(
-            "| {} | {} | {} | {} | {} | {} |\n",
-            in_words(row),
-            row.threads,
-            error(row.mse_mm2, row.mse_std),
-            error(row.max_mm, row.max_std),
-            figure(row.ms_p50),
-            figure(row.ms_p99)
-        ));
-    }
-    out
+    Table::of(&[0], &DOCUMENT, rows).markdown()
 }
 
 /// A row's method and configuration, as a document names them.

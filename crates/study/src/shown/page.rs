@@ -10,6 +10,7 @@ use super::figures::{ALL, DatasetRow, Row};
 use super::host::{LAST, LATE, PRESENT, Shown, WAYS};
 use super::timing::Time;
 use super::truth::Truth;
+use crate::table::{Column, Table};
 use crate::tools::section;
 use upt_cli::plot::{Axes, Scale, label};
 use upt_cli::yardstick::cases::{ToolCase, ToolCases};
@@ -21,71 +22,81 @@ const FRAMES: &str = "#1f5f9f";
 const PLOTTED: &str = "probe";
 const PICTURED: &str = "stroke";
 
+const OVERALL: [Column<Row>; 9] = [
+    ("shown", |row| row.way.clone()),
+    ("MSE, mm²", |row| label(row.mse_mm2)),
+    ("over one step late", |row| ratio(row.over_late)),
+    ("the steps' own MSE, mm²", |row| label(row.step_mse_mm2)),
+    ("over the steps' own", |row| ratio(row.over_step)),
+    ("latency, ms", |row| format!("{:.0}", row.latency_ms)),
+    ("jump at an arrival, mm: median / worst", |row| {
+        [row.jump_median_mm, row.jump_mm]
+            .map(millimetres)
+            .join(" / ")
+    }),
+    (
+        "frame to frame against the truth, mm: median / worst",
+        |row| {
+            [row.unlike_median_mm, row.unlike_mm]
+                .map(millimetres)
+                .join(" / ")
+        },
+    ),
+    ("tool inside, mm: median / worst", |row| {
+        [row.penetration_median_mm, row.penetration_mm]
+            .map(label)
+            .join(" / ")
+    }),
+];
+
+const BY_PROGRAMME: [Column<Row>; 8] = [
+    ("programme", |row| row.programme.clone()),
+    ("cases", |row| row.cases.to_string()),
+    ("MSE, mm²", |row| label(row.mse_mm2)),
+    ("over one step late", |row| ratio(row.over_late)),
+    ("over the steps' own", |row| ratio(row.over_step)),
+    ("latency, ms", |row| format!("{:.0}", row.latency_ms)),
+    ("frame to frame against the truth, mm", |row| {
+        millimetres(row.unlike_mm)
+    }),
+    ("tool inside, mm", |row| label(row.penetration_mm)),
+];
+
+const BY_DATASET: [Column<DatasetRow>; 4] = [
+    ("dataset", |row| row.dataset.clone()),
+    ("cases", |row| row.cases.to_string()),
+    ("over one step late", |row| ratio(row.over_late)),
+    ("over the steps' own", |row| ratio(row.over_step)),
+];
+
+const CALLS: [Column<Time>; 5] = [
+    ("present call in contact", |time| time.region.to_string()),
+    ("nodes", |time| time.nodes.to_string()),
+    ("calls", |time| time.calls.to_string()),
+    ("median, ms", |time| label(time.median_ms)),
+    ("99 %, ms", |time| label(time.p99_ms)),
+];
+
 /// The rows over all, the ratios by programme and by dataset with the bundle's frame step, and the times.
 pub fn markdown(lead: &str, rows: &[Row], datasets: &[DatasetRow], times: &[Time]) -> String {
-    let mut out = format!("\n{lead}\n\n");
-    out += "| shown | MSE, mm² | over one step late | the steps' own MSE, mm² | over the steps' own | latency, ms | jump at an arrival, mm: median / worst | frame to frame against the truth, mm: median / worst | tool inside, mm: median / worst |\n";
-    out += "|---|---:|---:|---:|---:|---:|---:|---:|---:|\n";
     let overall = || rows.iter().filter(|row| row.programme == ALL);
-    for row in overall() {
-        out += &format!(
-            "| {} | {} | {} | {} | {} | {:.0} | {} / {} | {} / {} | {} / {} |\n",
-            row.way,
-            label(row.mse_mm2),
-            ratio(row.over_late),
-            label(row.step_mse_mm2),
-            ratio(row.over_step),
-            row.latency_ms,
-            millimetres(row.jump_median_mm),
-            millimetres(row.jump_mm),
-            millimetres(row.unlike_median_mm),
-            millimetres(row.unlike_mm),
-            label(row.penetration_median_mm),
-            label(row.penetration_mm),
-        );
-    }
     let shown = overall().nth(WAYS.len()).map_or("", |row| row.way.as_str());
+    let presented = |row: &&Row| row.programme != ALL && row.way == shown;
+    let mut out = format!(
+        "\n{lead}\n\n{}",
+        Table::of(&[0], &OVERALL, overall()).markdown()
+    );
     if let Some(row) = rows.first() {
         out += &format!(
             "\nDeepest point of the truth in a tool: {} mm. By programme, {shown}:\n\n",
             label(row.true_penetration_mm)
         );
     }
-    out += "| programme | cases | MSE, mm² | over one step late | over the steps' own | latency, ms | frame to frame against the truth, mm | tool inside, mm |\n";
-    out += "|---|---:|---:|---:|---:|---:|---:|---:|\n";
-    let presented = |row: &&Row| row.programme != ALL && row.way == shown;
-    for row in rows.iter().filter(presented) {
-        out += &format!(
-            "| {} | {} | {} | {} | {} | {:.0} | {} | {} |\n",
-            row.programme,
-            row.cases,
-            label(row.mse_mm2),
-            ratio(row.over_late),
-            ratio(row.over_step),
-            row.latency_ms,
-            millimetres(row.unlike_mm),
-            label(row.penetration_mm),
-        );
-    }
+    out += &Table::of(&[0], &BY_PROGRAMME, rows.iter().filter(presented)).markdown();
     if !datasets.is_empty() {
-        out += "\n| dataset | cases | over one step late | over the steps' own |\n|---|---:|---:|---:|\n";
+        out += &format!("\n{}", Table::of(&[0], &BY_DATASET, datasets).markdown());
     }
-    for row in datasets {
-        let (late, step) = (ratio(row.over_late), ratio(row.over_step));
-        out += &format!("| {} | {} | {late} | {step} |\n", row.dataset, row.cases);
-    }
-    out += "\n| present call in contact | nodes | calls | median, ms | 99 %, ms |\n|---|---:|---:|---:|---:|\n";
-    for time in times {
-        out += &format!(
-            "| {} | {} | {} | {} | {} |\n",
-            time.region,
-            time.nodes,
-            time.calls,
-            label(time.median_ms),
-            label(time.p99_ms)
-        );
-    }
-    out
+    out + "\n" + &Table::of(&[0], &CALLS, times).markdown()
 }
 
 /// Rounding is no motion.

@@ -13,6 +13,7 @@ use tissue::schemes::FRAME_S;
 
 use super::truth::{Truth, places};
 use crate::quantile::median;
+use crate::table::{Column, Table};
 use crate::tools::bundles::fitting;
 use upt_cli::counted::counted;
 use upt_cli::effort::Effort;
@@ -140,7 +141,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             counted(plan.threads as usize, "thread"),
             machine.cpu,
             counted(machine.cores, "core"),
-            table(&rows)
+            Table::of(&[], &COLUMNS, &rows).markdown()
         );
         for path in plan.markdown {
             replace_between(
@@ -253,25 +254,19 @@ fn row(bundle: &str, corrections: Effort, step_ms: f64, sums: &[Sums]) -> Row {
     }
 }
 
-fn table(rows: &[Row]) -> String {
-    let mut out = String::from(
-        "| k | step, ms | MSE in contact, mm² | MSE without, mm² | worst case, mm² | force error | deepest in a tool, mm | ms a step in contact | ms a step without | of real time, in contact |\n",
-    );
-    out += "|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
-    for row in rows {
-        out += &format!(
-            "| {} | {} | {} | {} | {} | {:.1} % | {} | {} | {} | {:.0} % |\n",
-            row.corrections,
-            row.step_ms,
-            label(row.contact_mse_mm2),
-            label(row.free_mse_mm2),
-            label(row.worst_case_mm2),
-            1e2 * row.force_error,
-            label(row.penetration_mm),
-            label(row.contact_ms),
-            label(row.free_ms),
-            1e2 * row.contact_ms / row.step_ms,
-        );
-    }
-    out
-}
+const COLUMNS: [Column<Row>; 10] = [
+    ("k", |row| row.corrections.to_string()),
+    ("step, ms", |row| row.step_ms.to_string()),
+    ("MSE in contact, mm²", |row| label(row.contact_mse_mm2)),
+    ("MSE without, mm²", |row| label(row.free_mse_mm2)),
+    ("worst case, mm²", |row| label(row.worst_case_mm2)),
+    ("force error", |row| {
+        format!("{:.1} %", 1e2 * row.force_error)
+    }),
+    ("deepest in a tool, mm", |row| label(row.penetration_mm)),
+    ("ms a step in contact", |row| label(row.contact_ms)),
+    ("ms a step without", |row| label(row.free_ms)),
+    ("of real time, in contact", |row| {
+        format!("{:.0} %", 1e2 * row.contact_ms / row.step_ms)
+    }),
+];

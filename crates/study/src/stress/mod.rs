@@ -15,6 +15,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 
+use crate::table::{Column, Table};
 pub use row::{Row, Verdict};
 use upt_cli::counted::counted;
 
@@ -58,7 +59,10 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         };
         rows.extend(found.with_context(|| format!("{}", bundle.display()))?);
     }
-    print!("{}", table(&rows));
+    // What happened is long: it comes last.
+    let [subject, case, happened, verdict] = COLUMNS;
+    let columns = [subject, case, verdict, happened];
+    print!("{}", Table::of(&[0, 1, 2, 3], &columns, &rows).text());
     if let Some(path) = &options.json {
         std::fs::write(path, serde_json::to_string_pretty(&rows)?)
             .with_context(|| format!("{}", path.display()))?;
@@ -84,37 +88,17 @@ fn word(verdict: Verdict) -> &'static str {
     }
 }
 
-fn table(rows: &[Row]) -> String {
-    let wide = |f: fn(&Row) -> usize| rows.iter().map(f).max().unwrap_or(0);
-    let (a, b) = (wide(|r| r.subject.len()), wide(|r| r.case.len()));
-    rows.iter()
-        .map(|r| {
-            format!(
-                "{:a$}  {:b$}  {:8}  {}\n",
-                r.subject,
-                r.case,
-                word(r.verdict),
-                r.happened
-            )
-        })
-        .collect()
-}
+const COLUMNS: [Column<Row>; 4] = [
+    ("subject", |row| row.subject.clone()),
+    ("case", |row| row.case.clone()),
+    ("what happened", |row| row.happened.clone()),
+    ("verdict", |row| word(row.verdict).into()),
+];
 
 fn write_page(path: &std::path::Path, rows: &[Row]) -> Result<()> {
-    let mut text = String::new();
-    let mut subject = "";
-    for row in rows {
-        if row.subject != subject {
-            subject = &row.subject;
-            text +=
-                &format!("\n### {subject}\n\n| case | what happened | verdict |\n|---|---|---|\n");
-        }
-        text += &format!(
-            "| {} | {} | {} |\n",
-            row.case,
-            row.happened.replace('|', "\\|"),
-            word(row.verdict)
-        );
-    }
-    upt_cli::marks::replace_between(path, "study stress", &text)
+    let of_one = rows.chunk_by(|a, b| a.subject == b.subject).map(|own| {
+        let table = Table::of(&[0, 1, 2], &COLUMNS[1..], own).markdown();
+        format!("\n### {}\n\n{table}", own[0].subject)
+    });
+    upt_cli::marks::replace_between(path, "study stress", &of_one.collect::<String>())
 }

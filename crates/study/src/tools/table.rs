@@ -1,14 +1,11 @@
 //! The rows as a table: for the terminal, for a page and for a document.
 
 use super::row::{ALL, Row};
-use crate::report::table::aligned;
+use crate::table::{Column, Table, or_dash};
 use upt_cli::plot::label;
 
-/// What a column shows of a row.
-type Cell = fn(&Row) -> String;
-
 /// Column titles and cells; the first three name the row.
-pub const COLUMNS: &[(&str, Cell)] = &[
+pub const COLUMNS: &[Column<Row>] = &[
     ("method", |row| match row.bundle.as_str() {
         "" => row.drive.to_owned(),
         bundle => format!("{bundle}, {}", row.drive),
@@ -28,23 +25,18 @@ pub const COLUMNS: &[(&str, Cell)] = &[
     ("silent", |row| percent(row.inverted_silent)),
     ("penetration, mm", |row| label(row.penetration_mm)),
     ("jump", |row| format!("{:.2}", row.jump_median)),
-    ("force", |row| row.force_error.map_or_else(none, percent)),
-    ("torque", |row| row.torque_error.map_or_else(none, percent)),
+    ("force", |row| or_dash(row.force_error, percent)),
+    ("torque", |row| or_dash(row.torque_error, percent)),
     ("friction", |row| {
-        row.friction_excess
-            .map_or_else(none, |excess| match excess {
-                excess if excess > 9.99 => "above 10".into(),
-                excess => format!("{excess:+.2}"),
-            })
+        or_dash(row.friction_excess, |excess| match excess {
+            excess if excess > 9.99 => "above 10".into(),
+            excess => format!("{excess:+.2}"),
+        })
     }),
-    ("still, mm", |row| {
-        row.still_beyond_mm.map_or_else(none, label)
-    }),
+    ("still, mm", |row| or_dash(row.still_beyond_mm, label)),
     ("found again", |row| row.found_again.to_string()),
-    ("ms", |row| row.ms_median.map_or_else(none, label)),
-    ("contact ms", |row| {
-        row.contact_ms_median.map_or_else(none, label)
-    }),
+    ("ms", |row| or_dash(row.ms_median, label)),
+    ("contact ms", |row| or_dash(row.contact_ms_median, label)),
 ];
 
 /// What the columns mean, for a page.
@@ -56,10 +48,6 @@ largest motion of a node in a step over the truth's largest (median of the cases
 median of the tools. Friction: the largest sum of tangential over normal force of a tool, less its coefficient. Still: the largest motion \
 of a node in a step after the tools have not moved for 1 s, beyond the truth's where the truth was held as long. Found again: contacts that begin after one was lost and that the truth has not. \
 ms: median of the steps in which a tool touches.";
-
-fn none() -> String {
-    "-".into()
-}
 
 fn percent(share: f64) -> String {
     match share {
@@ -97,14 +85,12 @@ const TERMINAL: [&str; 8] = [
 /// The rows for the terminal, names to the left, figures to the right.
 pub fn text(rows: &[Row]) -> String {
     let shown = COLUMNS.iter().filter(|column| TERMINAL.contains(&column.0));
-    let shown: Vec<&(&str, Cell)> = shown.collect();
-    let cells = |row: &Row| shown.iter().map(|column| (column.1)(row)).collect();
-    let head = shown.iter().map(|column| column.0.to_owned()).collect();
-    aligned(head, rows.iter().map(cells), &[0, 2])
+    let shown: Vec<Column<Row>> = shown.copied().collect();
+    Table::of(&[0, 2], &shown, rows).text()
 }
 
 /// The columns of a table that has to be narrow.
-pub const FEW: &[(&str, Cell)] = &[
+pub const FEW: &[Column<Row>] = &[
     ("method", |row| match row.bundle.as_str() {
         "" => row.drive.to_owned(),
         bundle => format!("`{bundle}`, {}", row.drive),
@@ -115,30 +101,10 @@ pub const FEW: &[(&str, Cell)] = &[
     }),
     ("MSE, mm² (median)", |row| label(row.mse_median_mm2)),
     ("worst programme", |row| label(row.mse_worst_programme_mm2)),
-    ("force error", |row| {
-        row.force_error.map_or_else(none, percent)
-    }),
+    ("force error", |row| or_dash(row.force_error, percent)),
     ("steps with an inverted element", |row| {
         percent(row.inverted)
     }),
     ("deepest in a tool, mm", |row| label(row.penetration_mm)),
-    ("ms a step", |row| row.ms_median.map_or_else(none, label)),
+    ("ms a step", |row| or_dash(row.ms_median, label)),
 ];
-
-/// A table of Markdown, figures to the right.
-pub fn markdown(columns: &[(&str, Cell)], rows: &[&Row]) -> String {
-    let head: Vec<&str> = columns.iter().map(|column| column.0).collect();
-    let rule: Vec<&str> = columns
-        .iter()
-        .map(|column| match column.0 {
-            "method" | "programme" => "---",
-            _ => "---:",
-        })
-        .collect();
-    let mut out = format!("| {} |\n|{}|\n", head.join(" | "), rule.join("|"));
-    for row in rows {
-        let cells: Vec<String> = columns.iter().map(|column| (column.1)(row)).collect();
-        out.push_str(&format!("| {} |\n", cells.join(" | ")));
-    }
-    out
-}

@@ -8,6 +8,7 @@ use tissue::mesh::Mesh;
 
 use super::row::{ALL, Row};
 use super::{Measured, Plan, force, page, section, table};
+use crate::table::Table;
 use upt_cli::counted::counted;
 use upt_cli::machine::Machine;
 use upt_cli::marks::replace_between;
@@ -157,38 +158,38 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
     Ok(report)
 }
 
-/// Writes the tables of a document: all columns between the markers `upt-study report --tools MESH [--boundary NAME]`, or few between those
-/// with `summary` behind.
+/// Writes the tables of a document: all columns between the marks `study report --tools MESH [--boundary NAME]`, and few between those
+/// with `summary` behind; one of them may be missing.
 fn document(path: &Path, cases: &str, made: &str, rows: &[Row]) -> Result<()> {
     let name = format!("study report --tools {cases}");
     let summary = format!("{name} summary");
     let over_all: Vec<&Row> = rows.iter().filter(|row| row.programme == ALL).collect();
     let page = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
-    if page.contains(&format!("begin: {summary} ")) {
+    let has = |name: &str| page.contains(&format!("begin: {name} -->"));
+    if has(&name) || !has(&summary) {
+        let solved = |row: &&&Row| {
+            let corrected = row.corrections.most > 0 && row.drive == Drive::Solved.name();
+            row.bundle.is_empty() || corrected
+        };
+        let each = table::by_programme(rows);
+        let text = format!(
+            "\n{made}\n\n{}\nBy programme, where contact is solved inside the corrections:\n\n{}",
+            Table::of(&[0, 2], table::COLUMNS, over_all.iter().copied()).markdown(),
+            Table::of(&[0, 2], table::COLUMNS, each.iter().filter(solved).copied()).markdown()
+        );
+        replace_between(path, &name, &text)?;
+    }
+    if has(&summary) {
         // The geometric rule once, with the most corrections: their number hardly matters to it.
-        let most = rows
-            .iter()
-            .map(|row| row.corrections.most)
-            .max()
-            .unwrap_or(0);
-        let methods: Vec<&Row> = over_all
+        let most = rows.iter().map(|row| row.corrections.most).max();
+        let methods = over_all
             .into_iter()
             .filter(|row| !row.bundle.is_empty())
-            .filter(|row| row.drive != Drive::Geometric.name() || row.corrections.most == most)
-            .collect();
-        let text = table::markdown(table::FEW, &methods);
-        return replace_between(path, &summary, &format!("\n{made}\n\n{text}"));
+            .filter(|row| {
+                row.drive != Drive::Geometric.name() || Some(row.corrections.most) == most
+            });
+        let table = Table::of(&[0], table::FEW, methods).markdown();
+        replace_between(path, &summary, &format!("\n{made}\n\n{table}"))?;
     }
-    let each: Vec<&Row> = table::by_programme(rows)
-        .into_iter()
-        .filter(|row| {
-            row.bundle.is_empty() || row.corrections.most > 0 && row.drive == Drive::Solved.name()
-        })
-        .collect();
-    let text = format!(
-        "\n{made}\n\n{}\nBy programme, where contact is solved inside the corrections:\n\n{}",
-        table::markdown(table::COLUMNS, &over_all),
-        table::markdown(table::COLUMNS, &each)
-    );
-    replace_between(path, &name, &text)
+    Ok(())
 }
