@@ -2,7 +2,6 @@
 //!
 //! Both get the same ties, step by step from their own last state. The solver runs here: a case is three seconds of tissue.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,29 +9,18 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use contact::Vector;
 use serde::Serialize;
-use tissue::hang::{Hang, HangSizes};
+use tissue::hang::Hang;
 use tissue::mesh::{Boundary, Mesh};
 use tissue::schemes::FRAME_S;
 use tissue::solver::{Solver, SolverOptions};
 use upt::{Corrections, Loads, Model, ModelOptions, Scene, SceneOptions, StepInput};
 
 use crate::quantile::median;
+use crate::report::options::Options;
+use crate::table::{Column, Table};
 use upt_cli::bundle_folder::BundleFolder;
 use upt_cli::effort::Effort;
 use upt_cli::marks::replace_between;
-
-/// What is measured.
-pub struct Plan<'a> {
-    /// Cases of each bundle, with seeds from 1.
-    pub cases: usize,
-    pub sizes: HangSizes,
-    pub bundles: &'a [PathBuf],
-    /// Corrections a step; none: as many as a bundle recommends.
-    pub corrections: &'a [Effort],
-    pub threads: u32,
-    pub markdown: &'a [PathBuf],
-    pub json: bool,
-}
 
 /// A case of the reference solver: by frame the force of each tie (mN), the field, and when each broke.
 struct Truth {
@@ -69,44 +57,45 @@ struct Row {
 }
 
 /// Measures and prints the table.
-pub fn report(plan: &Plan<'_>) -> Result<ExitCode> {
-    if plan.bundles.is_empty() {
+pub fn report(asked: &Options) -> Result<ExitCode> {
+    if asked.bundles.is_empty() {
         bail!("name the bundles to measure with --bundle");
     }
     let mut rows = Vec::new();
-    for path in plan.bundles {
+    for path in &asked.bundles {
         let bundle = BundleFolder::read(path)?;
         let mesh = Mesh::read(&bundle.mesh_file)?;
         let boundary: Boundary = bundle.boundary.parse().map_err(anyhow::Error::msg)?;
         let options = ModelOptions::default();
         let model = Model::open(path, &options).with_context(|| path.display().to_string())?;
         let mut truths = Vec::new();
-        for seed in 1..=plan.cases as u64 {
-            eprintln!("{}: case {seed} of {}", bundle.name, plan.cases);
-            truths.push(truth(plan, seed, &mesh, boundary, &model)?);
+        for seed in 1..=asked.hang as u64 {
+            eprintln!("{}: case {seed} of {}", bundle.name, asked.hang);
+            truths.push(truth(asked, seed, &mesh, boundary, &model)?);
         }
         let recommended = bundle.corrections.unwrap_or(Effort::NONE);
-        let efforts = match plan.corrections {
+        let efforts = match asked.corrections.as_slice() {
             [] => &[recommended],
             efforts => efforts,
         };
         for effort in efforts {
-            rows.push(measure(plan, *effort, &bundle, &model, &truths)?);
+            rows.push(measure(asked, *effort, &bundle, &model, &truths)?);
         }
     }
-    match plan.json {
+    let table = Table::of(&[0], &COLUMNS, &rows).markdown();
+    match asked.json {
         true => println!("{}", serde_json::to_string_pretty(&rows)?),
-        false => print!("{}", table(&rows)),
+        false => print!("{table}"),
     }
-    for page in plan.markdown {
-        replace_between(page, "study report --hang", &format!("\n{}", table(&rows)))?;
+    for page in &asked.markdown {
+        replace_between(page, "study report --hang", &format!("\n{table}"))?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
 /// The reference solver's answer, with the bundle's material.
 fn truth(
-    plan: &Plan<'_>,
+    asked: &Options,
     seed: u64,
     mesh: &Mesh,
     boundary: Boundary,
@@ -114,10 +103,10 @@ fn truth(
 ) -> Result<Truth> {
     let options = SolverOptions {
         material: model.manifest.material,
-        threads: plan.threads as usize,
+        threads: asked.most_threads() as usize,
         ..SolverOptions::default()
     };
-    let hang = Hang::new(mesh, boundary, seed, plan.sizes)
+    let hang = Hang::new(mesh, boundary, seed, asked.bed_sizes())
         .context("no part of the domain has room for the bed; give a smaller radius")?;
     let mut solver = Solver::new(mesh, boundary, options)?;
     let (mut forces, mut fields, mut broke_s) = (Vec::new(), Vec::new(), Vec::new());
@@ -140,14 +129,14 @@ fn truth(
 }
 
 fn measure(
-    plan: &Plan<'_>,
+    asked: &Options,
     effort: Effort,
     bundle: &BundleFolder,
     model: &Arc<Model>,
     truths: &[Truth],
 ) -> Result<Row> {
     let options = SceneOptions {
-        threads: plan.threads as usize,
+        threads: asked.most_threads() as usize,
         corrections: match (effort.most, effort.target_mm) {
             (0, _) => bail!("ties pull in corrections; give --corrections at least 1"),
             (most, 0.0) => Corrections::Fixed(most),
@@ -255,29 +244,29 @@ fn measure(
     })
 }
 
-fn table(rows: &[Row]) -> String {
-    let mut text = String::from(
-        "| bundle | k | cases | ties | torn: solver, libupt | the same first (of so many in that step) | late, steps (worst) | force error: bed | thread | MSE, mm² (median) | worst | smallest det F | ms a step |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
-    );
-    for row in rows {
-        let [solver, own] = row.torn;
-        let [late, latest] = row.late;
-        text += &format!(
-            "| `{}` | {} | {} | {} | {solver}, {own} | {} of {} ({:.1}) | {late:.1} ({latest:.1}) | {:.1} % | {:.1} % | {:.2e} | {:.2e} | {:.2} | {:.1} |\n",
-            row.bundle,
-            row.corrections,
-            row.cases,
-            row.ties,
-            row.same_first,
-            row.cases,
-            row.first_step,
-            100.0 * row.force_error,
-            100.0 * row.thread_error,
-            row.mse,
-            row.worst_mse,
-            row.smallest_det,
-            row.step_ms,
-        );
-    }
-    text
-}
+const COLUMNS: [Column<Row>; 13] = [
+    ("bundle", |row| format!("`{}`", row.bundle)),
+    ("k", |row| row.corrections.clone()),
+    ("cases", |row| row.cases.to_string()),
+    ("ties", |row| row.ties.to_string()),
+    ("torn: solver, libupt", |row| {
+        format!("{}, {}", row.torn[0], row.torn[1])
+    }),
+    ("the same first (of so many in that step)", |row| {
+        format!(
+            "{} of {} ({:.1})",
+            row.same_first, row.cases, row.first_step
+        )
+    }),
+    ("late, steps (worst)", |row| {
+        format!("{:.1} ({:.1})", row.late[0], row.late[1])
+    }),
+    ("force error: bed", |row| {
+        format!("{:.1} %", 100.0 * row.force_error)
+    }),
+    ("thread", |row| format!("{:.1} %", 100.0 * row.thread_error)),
+    ("MSE, mm² (median)", |row| format!("{:.2e}", row.mse)),
+    ("worst", |row| format!("{:.2e}", row.worst_mse)),
+    ("smallest det F", |row| format!("{:.2}", row.smallest_det)),
+    ("ms a step", |row| format!("{:.1}", row.step_ms)),
+];

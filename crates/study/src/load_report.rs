@@ -2,7 +2,6 @@
 //!
 //! Both get the same loads, step by step from their own last state. A moving support is compared in its own frame, in which the library has all. The solver runs here: a case of loads is seconds of tissue.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
@@ -10,9 +9,8 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use contact::{Body, Pose, Vector, pose};
 use serde::Serialize;
-use tissue::load_programmes::{LoadProgramme, LoadSizes};
+use tissue::load_programmes::LoadProgramme;
 use tissue::mesh::{Boundary, Mesh};
-use tissue::programmes::ToolProgramme;
 use tissue::simulate::{ToolOrder, simulate_loads, simulate_tools};
 use tissue::solver::{SolverOptions, SupportMotion};
 use tissue::trajectory::Trajectory;
@@ -22,26 +20,12 @@ use upt::{
 };
 
 use crate::quantile::median;
+use crate::report::options::Options;
 use crate::table::{Column, Table, or_dash};
 use upt_cli::bundle_folder::BundleFolder;
 use upt_cli::effort::Effort;
 use upt_cli::marks::replace_between;
 use upt_cli::tool_scale;
-
-/// What is measured.
-pub struct Plan<'a> {
-    pub programmes: &'a [LoadProgramme],
-    pub sizes: LoadSizes,
-    /// A tool that touches the body meanwhile, with this seed.
-    pub tool: Option<ToolProgramme>,
-    pub seed: u64,
-    pub bundles: &'a [PathBuf],
-    /// Corrections a step; none: as many as a bundle recommends.
-    pub corrections: &'a [Effort],
-    pub threads: u32,
-    pub markdown: &'a [PathBuf],
-    pub json: bool,
-}
 
 /// A programme by a bundle.
 #[derive(Serialize)]
@@ -63,28 +47,28 @@ struct Row {
 }
 
 /// Measures and prints the table.
-pub fn report(plan: &Plan<'_>) -> Result<ExitCode> {
-    if plan.bundles.is_empty() {
+pub fn report(asked: &Options) -> Result<ExitCode> {
+    if asked.bundles.is_empty() {
         bail!("name the bundles to measure with --bundle");
     }
     let mut rows = Vec::new();
-    for path in plan.bundles {
+    for path in &asked.bundles {
         let bundle = BundleFolder::read(path)?;
         let mesh = Mesh::read(&bundle.mesh_file)?;
         let boundary: Boundary = bundle.boundary.parse().map_err(anyhow::Error::msg)?;
         let options = ModelOptions::default();
         let model = Model::open(path, &options).with_context(|| path.display().to_string())?;
-        for programme in plan.programmes {
+        for programme in &asked.load {
             eprintln!("{}: {}", bundle.name, programme.name());
-            let truth = truth(plan, *programme, &mesh, boundary, &model)?;
+            let truth = truth(asked, *programme, &mesh, boundary, &model)?;
             let recommended = bundle.corrections.unwrap_or(Effort::NONE);
-            let efforts = match plan.corrections {
+            let efforts = match asked.corrections.as_slice() {
                 [] => &[recommended],
                 efforts => efforts,
             };
             for effort in efforts {
                 rows.push(measure(
-                    plan,
+                    asked,
                     (*programme, *effort),
                     &bundle,
                     &model,
@@ -94,12 +78,12 @@ pub fn report(plan: &Plan<'_>) -> Result<ExitCode> {
         }
     }
     let table = Table::of(&[0, 1, 2], &COLUMNS, &rows).markdown();
-    if plan.json {
+    if asked.json {
         println!("{}", serde_json::to_string_pretty(&rows)?);
     } else {
         print!("{table}");
     }
-    for page in plan.markdown {
+    for page in &asked.markdown {
         replace_between(page, "study report --load", &format!("\n{table}"))?;
     }
     Ok(ExitCode::SUCCESS)
@@ -107,7 +91,7 @@ pub fn report(plan: &Plan<'_>) -> Result<ExitCode> {
 
 /// The reference solver's answer, with the bundle's material.
 fn truth(
-    plan: &Plan<'_>,
+    asked: &Options,
     programme: LoadProgramme,
     mesh: &Mesh,
     boundary: Boundary,
@@ -115,17 +99,17 @@ fn truth(
 ) -> Result<Trajectory> {
     let options = SolverOptions {
         material: model.manifest.material,
-        threads: plan.threads as usize,
+        threads: asked.most_threads() as usize,
         ..SolverOptions::default()
     };
-    let load = (programme, plan.sizes);
-    let case = match plan.tool {
+    let load = (programme, asked.load_sizes.sizes());
+    let case = match asked.tool {
         None => simulate_loads(mesh, boundary, load, &options, |_, _| {}),
         Some(tool) => {
             let order = ToolOrder {
                 load: Some(load),
                 scale: tool_scale::Chosen::of(tool_scale::Arguments::default(), mesh, None).scale,
-                ..ToolOrder::new(tool, plan.seed)
+                ..ToolOrder::new(tool, asked.seed)
             };
             simulate_tools(mesh, boundary, order, &options, |_, _| {})
         }
@@ -134,14 +118,14 @@ fn truth(
 }
 
 fn measure(
-    plan: &Plan<'_>,
+    asked: &Options,
     (programme, effort): (LoadProgramme, Effort),
     bundle: &BundleFolder,
     model: &Arc<Model>,
     truth: &Trajectory,
 ) -> Result<Row> {
     let options = SceneOptions {
-        threads: plan.threads as usize,
+        threads: asked.most_threads() as usize,
         corrections: match (effort.most, effort.target_mm) {
             (0, _) => bail!("loads act in corrections; give --corrections at least 1"),
             (most, 0.0) => Corrections::Fixed(most),
@@ -173,7 +157,7 @@ fn measure(
     }
     for step in 1..truth.frame_count() {
         let time_s = step as f64 * truth.header.dt_s;
-        let (gravity, pascal) = programme.at(plan.sizes, time_s);
+        let (gravity, pascal) = programme.at(asked.load_sizes.sizes(), time_s);
         let support = programme.support_at(time_s).map(support_pose);
         let frame = (support.as_ref())
             .map(|support| pose::checked(support.position, support.rotation))
@@ -239,7 +223,7 @@ fn measure(
     Ok(Row {
         bundle: bundle.name.clone(),
         load: programme.name(),
-        tool: plan.tool.map_or("none", |tool| tool.name()),
+        tool: asked.tool.map_or("none", |tool| tool.name()),
         corrections: effort.to_string(),
         farthest_mm: farthest.sqrt(),
         mse: median(errors.iter().copied()),

@@ -12,7 +12,7 @@ pub mod html;
 mod measure;
 pub mod memory;
 pub mod method;
-mod options;
+pub mod options;
 mod paper_split;
 pub mod pictures;
 mod plot;
@@ -42,73 +42,20 @@ use row::Measurement;
 use upt_cli::setting::Region;
 
 pub fn run(options: &Options) -> Result<ExitCode> {
-    let threads = options.threads.iter().copied().max().unwrap_or(1);
     if !options.load.is_empty() {
-        return load_report::report(&load_report::Plan {
-            programmes: &options.load,
-            sizes: options.load_sizes.sizes(),
-            tool: options.tool,
-            seed: options.seed,
-            bundles: &options.bundles,
-            corrections: &options.corrections,
-            threads,
-            markdown: &options.markdown,
-            json: options.json,
-        });
+        return load_report::report(options);
     }
     if options.hang > 0 {
-        return hang_report::report(&hang_report::Plan {
-            cases: options.hang,
-            sizes: options.bed_sizes(),
-            bundles: &options.bundles,
-            corrections: &options.corrections,
-            threads,
-            markdown: &options.markdown,
-            json: options.json,
-        });
+        return hang_report::report(options);
     }
     if let Some(hz) = options.shown {
-        return shown::report(&shown::Plan {
-            hz,
-            arrival_ms: options.arrival_ms,
-            paths: &options.tools,
-            split: options.split,
-            per_programme: options.cases,
-            bundles: &options.bundles,
-            corrections: options.corrections.first().copied(),
-            step_ms: &options.step_ms,
-            threads,
-            out: options.out.clone(),
-            markdown: &options.markdown,
-            json: options.json,
-        });
+        return shown::report(options, hz);
     }
     if !options.step_ms.is_empty() {
-        return shown::steps::report(&shown::steps::Plan {
-            step_ms: &options.step_ms,
-            paths: &options.tools,
-            split: options.split,
-            per_programme: options.cases,
-            bundles: &options.bundles,
-            corrections: &options.corrections,
-            threads,
-            markdown: &options.markdown,
-            json: options.json,
-        });
+        return shown::steps::report(options);
     }
     if !options.tools.is_empty() {
-        return tools::report(&tools::Plan {
-            paths: &options.tools,
-            split: options.split,
-            per_programme: options.cases,
-            bundles: &options.bundles,
-            corrections: &options.corrections,
-            threads,
-            out: options.out.clone(),
-            title: options.title.as_deref().unwrap_or("From pose to picture"),
-            markdown: &options.markdown,
-            json: options.json,
-        });
+        return tools::report(options);
     }
     let cases = Cases::read(&options.trajectories, &options.data, options.cases)?;
     let mut notes = Vec::new();

@@ -28,108 +28,113 @@ The command writes report.json, report.html and report.md (the table for a docum
 pub struct Options {
     /// Bundles. Default: all below onnx/ that fit the cases' mesh and boundary condition.
     #[arg(long = "bundle", value_name = "FOLDER")]
-    pub(super) bundles: Vec<PathBuf>,
+    pub bundles: Vec<PathBuf>,
     /// A trajectory to replay (repeat for several).
     #[arg(long = "trajectory", value_name = "FILE")]
-    pub(super) trajectories: Vec<PathBuf>,
+    pub trajectories: Vec<PathBuf>,
     /// A dataset folder whose test split is replayed (repeat for several).
     #[arg(long = "data", value_name = "FOLDER")]
-    pub(super) data: Vec<PathBuf>,
+    pub data: Vec<PathBuf>,
     /// A dataset folder or a trajectory with rigid tools (`upt dataset --tools`, repeat for several): the tools' poses alone drive the library. Of the options below, only --split, --cases, --corrections, --threads (the largest), --out,
     /// --title, --markdown and --json apply.
     #[arg(long = "tools", value_name = "PATH", conflicts_with_all = ["trajectories", "data"])]
-    pub(super) tools: Vec<PathBuf>,
+    pub tools: Vec<PathBuf>,
     /// Cases of the datasets of --tools: held-out ones, those that bundles may learn from, or both.
     #[arg(long, default_value = "test", requires = "tools")]
-    pub(super) split: Split,
+    pub split: Split,
     /// Measure what a host shows between steps, at this many frames a second; --tools names datasets with frames shorter than a step
     /// (`upt dataset --tools all --frame-ms 5`). Writes shown.json and pictures; --markdown replaces the part between the markers
     /// `upt-study report --shown BUNDLE`.
     #[arg(long, value_name = "HZ", requires = "tools")]
-    pub(super) shown: Option<f64>,
+    pub shown: Option<f64>,
     /// With --shown: time from a step's moment to the arrival of its state, ms.
     #[arg(long, default_value_t = 10.0, requires = "shown")]
-    pub(super) arrival_ms: f64,
+    pub arrival_ms: f64,
     /// Lengths of a step, ms, 10 to 50. With --shown: also measure frames between such steps. Without: measure the error of the steps by their
     /// length, against frames shorter than a step; --markdown replaces the part between the markers
     /// `upt-study report --step-ms BUNDLE`.
     #[arg(long, value_name = "MS", value_delimiter = ',', requires = "tools")]
-    pub(super) step_ms: Vec<f64>,
+    pub step_ms: Vec<f64>,
     /// Page whose part between the markers `upt-study report --tools MESH` (with `--boundary NAME` behind where it is not `fixed`) is replaced by the tables of --tools, or by a narrow table if the markers end in `summary` (repeat for several).
     #[arg(long, value_name = "FILE")]
-    pub(super) markdown: Vec<PathBuf>,
+    pub markdown: Vec<PathBuf>,
     /// Measure programmes of loads (tilt, pulse, sag, breathe) in the bundles of --bundle against the reference solver, which runs here. --markdown replaces the
     /// part between the markers `upt-study report --load`.
     #[arg(long, value_delimiter = ',', conflicts_with_all = ["trajectories", "data", "tools"])]
-    pub(super) load: Vec<LoadProgramme>,
+    pub load: Vec<LoadProgramme>,
     /// Measure so many cases of a bed of ties that a thread tears node by node, in the bundles of --bundle against the reference solver, which runs here. --markdown
     /// replaces the part between the markers `study report --hang`.
     #[arg(long, value_name = "CASES", default_value_t = 0, hide_default_value = true, conflicts_with_all = ["trajectories", "data", "tools", "load"])]
-    pub(super) hang: usize,
+    pub hang: usize,
     /// With --hang: stiffness of the bed's ties together, N/m.
     #[arg(long, default_value_t = HangSizes::default().stiffness)]
-    pub(super) bed_stiffness: f32,
+    pub bed_stiffness: f32,
     /// With --hang: what the bed's ties bear together, mN.
     #[arg(long, default_value_t = HangSizes::default().break_mn)]
-    pub(super) bed_break: f32,
+    pub bed_break: f32,
     /// With --load: a tool that touches the body meanwhile.
     #[arg(long, value_parser = upt_cli::loads::programme(), requires = "load")]
-    pub(super) tool: Option<ToolProgramme>,
+    pub tool: Option<ToolProgramme>,
     /// With --tool: seed of its case.
     #[arg(long, default_value_t = 1, requires = "load")]
-    pub(super) seed: u64,
+    pub seed: u64,
     #[command(flatten)]
-    pub(super) load_sizes: LoadArguments,
+    pub load_sizes: LoadArguments,
     /// The most cases of each scheme or programme.
     #[arg(long, default_value_t = 2)]
-    pub(super) cases: usize,
+    pub cases: usize,
     /// Folder for report.json, report.html, report.md and the finished rows.
     #[arg(long, default_value = "target/report")]
-    pub(super) out: PathBuf,
+    pub out: PathBuf,
     /// Threads of the library. Default: 1, and all of this machine's.
     #[arg(long, value_delimiter = ',', default_values_t = default_threads(), hide_default_value = true)]
-    pub(super) threads: Vec<u32>,
+    pub threads: Vec<u32>,
     /// Nodes that a step computes: all, those of the surface, or those of the domain.
     #[arg(long, value_delimiter = ',', default_value = "all,surface")]
-    pub(super) region: Vec<Region>,
+    pub region: Vec<Region>,
     /// Default: float32, and whatever else the bundle and this CPU support.
     #[arg(long, value_delimiter = ',')]
-    pub(super) precision: Vec<Precision>,
+    pub precision: Vec<Precision>,
     #[arg(long, value_delimiter = ',', default_value = "cpu")]
-    pub(super) provider: Vec<Provider>,
+    pub provider: Vec<Provider>,
     /// Corrections per step in contact: counts, or COUNT@MM for at most COUNT and fewer once the estimated error is below MM. Default: none and
     /// as many as the bundle recommends; with all nodes and the most threads also 0, 1, 3, 5 and 10.
     #[arg(long, value_delimiter = ',')]
-    pub(super) corrections: Vec<Effort>,
+    pub corrections: Vec<Effort>,
     /// Plain methods to compare with: zero, linear, prior (the bundles' linear response alone), coarse, tled, paper; or none.
     #[arg(
         long,
         value_delimiter = ',',
         default_value = DEFAULT_PLAIN
     )]
-    pub(super) plain: Vec<String>,
+    pub plain: Vec<String>,
     /// The mesh of `coarse`.
     #[arg(long, default_value = "onnx/meshes/brain-coarse.mesh.safetensors")]
-    pub(super) coarse_mesh: PathBuf,
+    pub coarse_mesh: PathBuf,
     /// Frames of the first case on which TLED itself is timed.
     #[arg(long, default_value_t = 40)]
-    pub(super) tled_frames: usize,
+    pub tled_frames: usize,
     /// Leave out the Hausdorff distance (the slowest of the metrics).
     #[arg(long)]
-    pub(super) no_hausdorff: bool,
+    pub no_hausdorff: bool,
     /// Measure again what is already stored.
     #[arg(long)]
-    pub(super) fresh: bool,
+    pub fresh: bool,
     /// The page's title.
     #[arg(long)]
-    pub(super) title: Option<String>,
+    pub title: Option<String>,
     /// Print report.json instead of the table.
     #[arg(long)]
-    pub(super) json: bool,
+    pub json: bool,
 }
 
 impl Options {
-    pub(super) fn bed_sizes(&self) -> HangSizes {
+    /// Where one number of threads is measured.
+    pub fn most_threads(&self) -> u32 {
+        self.threads.iter().copied().max().unwrap_or(1)
+    }
+
+    pub fn bed_sizes(&self) -> HangSizes {
         HangSizes {
             stiffness: self.bed_stiffness,
             break_mn: self.bed_break,
@@ -139,14 +144,14 @@ impl Options {
 }
 
 /// All that this build has.
-pub(super) const DEFAULT_PLAIN: &str = if cfg!(feature = "linear") {
+const DEFAULT_PLAIN: &str = if cfg!(feature = "linear") {
     "zero,linear,prior,coarse,tled,paper"
 } else {
     "zero,prior,coarse,tled,paper"
 };
 
 /// One thread, and all of them.
-pub(super) fn default_threads() -> Vec<u32> {
+fn default_threads() -> Vec<u32> {
     let all = std::thread::available_parallelism().map_or(1, usize::from) as u32;
     if all > 1 { vec![1, all] } else { vec![1] }
 }

@@ -18,13 +18,13 @@ pub mod steps;
 mod timing;
 mod truth;
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use serde_json::json;
 use tissue::mesh::{Boundary, Mesh};
 
+use crate::report::options::Options;
 use crate::tools::bundles::fitting;
 use figures::CaseFigures;
 use host::{Clock, Shown};
@@ -35,44 +35,24 @@ use upt_cli::host::{Model, ModelSettings};
 use upt_cli::machine::{Machine, load_words};
 use upt_cli::marks::replace_between;
 use upt_cli::progress;
-use upt_cli::yardstick::cases::{Split, ToolCases};
+use upt_cli::yardstick::cases::ToolCases;
 use upt_cli::yardstick::drive::{Drive, Driver};
 use upt_cli::yardstick::yard::Yard;
 
-/// What is measured.
-pub struct Plan<'a> {
-    /// Frames a second.
-    pub hz: f64,
-    /// Time from a step's moment to its state's arrival, ms.
-    pub arrival_ms: f64,
-    /// Dataset folders and trajectories with frames shorter than a step.
-    pub paths: &'a [PathBuf],
-    pub split: Split,
-    pub per_programme: usize,
-    pub bundles: &'a [PathBuf],
-    /// Corrections a step; none: as many as a bundle recommends.
-    pub corrections: Option<Effort>,
-    /// Lengths of step whose frames are measured besides the bundle's and the one that it recommends for frames, ms.
-    pub step_ms: &'a [f64],
-    pub threads: u32,
-    pub out: PathBuf,
-    pub markdown: &'a [PathBuf],
-    pub json: bool,
-}
-
 /// Measures, and writes shown.json and the pictures.
-pub fn report(plan: &Plan) -> Result<ExitCode> {
-    let clock = Clock::new(plan.hz, plan.arrival_ms)?;
-    let cases = ToolCases::read(plan.paths, plan.split, plan.per_programme)?;
+pub fn report(options: &Options, hz: f64) -> Result<ExitCode> {
+    let corrections = options.corrections.first().copied();
+    let clock = Clock::new(hz, options.arrival_ms)?;
+    let cases = ToolCases::read(&options.tools, options.split, options.cases)?;
     let mut notes = Vec::new();
-    let bundles = fitting(plan.bundles, &cases, &mut notes)?;
+    let bundles = fitting(&options.bundles, &cases, &mut notes)?;
     let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
     let mesh = Mesh::read(&bundles[0].mesh_file)?;
     cases.check(&mesh)?;
     let truths: Vec<Truth> = cases.list.iter().map(Truth::of).collect::<Result<_>>()?;
     let mut yard = Yard::new(&mesh, boundary);
-    std::fs::create_dir_all(&plan.out)
-        .with_context(|| format!("cannot make {}", plan.out.display()))?;
+    std::fs::create_dir_all(&options.out)
+        .with_context(|| format!("cannot make {}", options.out.display()))?;
     let header = &cases.list[0].trajectory.header;
     let (machine, date) = (Machine::this(), crate::date::date());
     let mut reports = Vec::new();
@@ -85,8 +65,8 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             continue;
         }
         let settings = ModelSettings {
-            threads: plan.threads,
-            corrections: plan.corrections,
+            threads: options.most_threads(),
+            corrections,
             ..ModelSettings::default()
         };
         let model = Model::open(&bundle.path, &settings)?;
@@ -109,7 +89,8 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             ),
         )];
         lengths.extend(
-            plan.step_ms
+            options
+                .step_ms
                 .iter()
                 .map(|ms| (1e-3 * ms, format!("steps of {ms} ms"))),
         );
@@ -147,41 +128,38 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
         )?;
         let rows = figures::rows(&figures);
         let datasets = figures::by_dataset(&figures, host::WAYS.len());
-        let k = plan
-            .corrections
-            .or(bundle.corrections)
-            .unwrap_or(Effort::NONE);
+        let k = corrections.or(bundle.corrections).unwrap_or(Effort::NONE);
         let lead = format!(
             "`{}`, k = {k}, {} on {} ({} nodes), frames at {} Hz, each state {} ms after its step's moment, {}. {} ({}{}), {date}.",
             bundle.name,
             counted(cases.list.len(), "case"),
             header.mesh_name,
             mesh.node_count(),
-            plan.hz,
-            plan.arrival_ms,
-            counted(plan.threads as usize, "thread"),
+            hz,
+            options.arrival_ms,
+            counted(options.most_threads() as usize, "thread"),
             machine.cpu,
             counted(machine.cores, "core"),
             load_words(),
         );
         let text = page::markdown(&lead, &rows, &datasets, &times);
-        for path in plan.markdown {
+        for path in &options.markdown {
             replace_between(
                 path,
                 &format!("study report --shown {}", bundle.name),
                 &text,
             )?;
         }
-        if !plan.json {
+        if !options.json {
             println!("{text}");
         }
         let pictures = page::pictures(
-            &plan.out,
+            &options.out,
             &bundle.name,
             (&mesh, &cases, &truths),
             [&outcomes, &between],
         )?;
-        for path in pictures.iter().filter(|_| !plan.json) {
+        for path in pictures.iter().filter(|_| !options.json) {
             println!("{}", path.display());
         }
         reports.push(json!({"bundle": bundle.name, "corrections": k.to_string(), "rows": rows, "datasets": datasets, "present": times, "cases": figures}));
@@ -192,20 +170,20 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     let report = json!({
         "machine": machine,
         "date": date,
-        "hz": plan.hz,
-        "arrival_ms": plan.arrival_ms,
-        "threads": plan.threads,
+        "hz": hz,
+        "arrival_ms": options.arrival_ms,
+        "threads": options.most_threads(),
         "versions": {"upt": env!("CARGO_PKG_VERSION"), "solver": header.solver},
         "mesh": {"name": header.mesh_name, "sha256": cases.mesh_sha256, "nodes": mesh.node_count(), "boundary": cases.boundary},
         "bundles": reports,
         "left_out": notes,
     });
     let text = serde_json::to_string_pretty(&report)? + "\n";
-    std::fs::write(plan.out.join("shown.json"), &text)?;
-    if plan.json {
+    std::fs::write(options.out.join("shown.json"), &text)?;
+    if options.json {
         print!("{text}");
     }
-    for note in notes.iter().filter(|_| !plan.json) {
+    for note in notes.iter().filter(|_| !options.json) {
         println!("left out: {note}");
     }
     Ok(ExitCode::SUCCESS)

@@ -1,7 +1,6 @@
 //! The error of steps by their length (`upt-study report --step-ms`): the same tools, a scene that steps every 10 to 50 ms, and the reference
 //! solver's state at the end of each step.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
@@ -13,6 +12,7 @@ use tissue::schemes::FRAME_S;
 
 use super::truth::{Truth, places};
 use crate::quantile::median;
+use crate::report::options::Options;
 use crate::table::{Column, Table};
 use crate::tools::bundles::fitting;
 use upt_cli::counted::counted;
@@ -22,27 +22,12 @@ use upt_cli::machine::Machine;
 use upt_cli::marks::replace_between;
 use upt_cli::plot::label;
 use upt_cli::progress;
-use upt_cli::yardstick::cases::{Split, ToolCase, ToolCases};
+use upt_cli::yardstick::cases::{ToolCase, ToolCases};
 use upt_cli::yardstick::drive::{Drive, Driver};
 use upt_cli::yardstick::yard::Yard;
 
 /// The truth's forces are taken as their mean over this time about a moment, s: impulses of contact are noisy.
 const FORCE_S: f64 = 0.025;
-
-/// What is measured.
-pub struct Plan<'a> {
-    pub step_ms: &'a [f64],
-    /// Dataset folders and trajectories with frames shorter than a step.
-    pub paths: &'a [PathBuf],
-    pub split: Split,
-    pub per_programme: usize,
-    pub bundles: &'a [PathBuf],
-    /// Corrections a step; none: as many as a bundle recommends.
-    pub corrections: &'a [Effort],
-    pub threads: u32,
-    pub markdown: &'a [PathBuf],
-    pub json: bool,
-}
 
 /// One length of step with one number of corrections, over all cases.
 #[derive(Debug, Serialize)]
@@ -87,10 +72,10 @@ impl Sums {
 }
 
 /// Measures, and writes the table.
-pub fn report(plan: &Plan) -> Result<ExitCode> {
-    let cases = ToolCases::read(plan.paths, plan.split, plan.per_programme)?;
+pub fn report(options: &Options) -> Result<ExitCode> {
+    let cases = ToolCases::read(&options.tools, options.split, options.cases)?;
     let mut notes = Vec::new();
-    let bundles = fitting(plan.bundles, &cases, &mut notes)?;
+    let bundles = fitting(&options.bundles, &cases, &mut notes)?;
     let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
     let mesh = Mesh::read(&bundles[0].mesh_file)?;
     cases.check(&mesh)?;
@@ -105,15 +90,15 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             notes.push(format!("{name}: has no corrections, so it has only one length of step; add them with `upt corrections`"));
             continue;
         };
-        let counts = match plan.corrections {
+        let counts = match options.corrections.as_slice() {
             [] => &[recommended],
             given => given,
         };
         let mut rows = Vec::new();
         for &count in counts {
-            for &step_ms in plan.step_ms {
+            for &step_ms in &options.step_ms {
                 let settings = ModelSettings {
-                    threads: plan.threads,
+                    threads: options.most_threads(),
                     corrections: Some(count),
                     step_s: 1e-3 * step_ms,
                     ..ModelSettings::default()
@@ -138,19 +123,19 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
             counted(cases.list.len(), "case"),
             header.mesh_name,
             mesh.node_count(),
-            counted(plan.threads as usize, "thread"),
+            counted(options.most_threads() as usize, "thread"),
             machine.cpu,
             counted(machine.cores, "core"),
             Table::of(&[], &COLUMNS, &rows).markdown()
         );
-        for path in plan.markdown {
+        for path in &options.markdown {
             replace_between(
                 path,
                 &format!("study report --step-ms {}", bundle.name),
                 &text,
             )?;
         }
-        if !plan.json {
+        if !options.json {
             println!("{text}");
         }
         all.extend(rows);
@@ -158,11 +143,11 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     if all.is_empty() {
         bail!("nothing could be measured: {}", notes.join("; "));
     }
-    if plan.json {
+    if options.json {
         let report = json!({"machine": machine, "date": date, "rows": all, "left_out": notes});
         println!("{}", serde_json::to_string_pretty(&report)?);
     }
-    for note in notes.iter().filter(|_| !plan.json) {
+    for note in notes.iter().filter(|_| !options.json) {
         println!("left out: {note}");
     }
     Ok(ExitCode::SUCCESS)

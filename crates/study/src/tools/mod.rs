@@ -10,8 +10,8 @@
 pub mod bundles;
 mod film;
 mod force;
+mod measured;
 mod page;
-mod plan;
 mod row;
 pub mod section;
 mod table;
@@ -23,8 +23,8 @@ use anyhow::{Result, bail};
 use serde_json::json;
 use tissue::mesh::{Boundary, Mesh};
 
-use plan::Measured;
-pub use plan::Plan;
+use crate::report::options::Options;
+use measured::Measured;
 use row::Label;
 use upt_cli::bundle_folder::BundleFolder;
 use upt_cli::effort::Effort;
@@ -37,11 +37,11 @@ use upt_cli::yardstick::{CaseFigures, Method};
 use write::{Made, write};
 
 /// Measures, and writes tools.json and tools.html.
-pub fn report(plan: &Plan) -> Result<ExitCode> {
-    let cases = ToolCases::read(plan.paths, plan.split, plan.per_programme)?;
+pub fn report(options: &Options) -> Result<ExitCode> {
+    let cases = ToolCases::read(&options.tools, options.split, options.cases)?;
     let mut notes = Vec::new();
     cases.check_steps()?;
-    let bundles = bundles::fitting(plan.bundles, &cases, &mut notes)?;
+    let bundles = bundles::fitting(&options.bundles, &cases, &mut notes)?;
     let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
     let mesh = Mesh::read(&bundles[0].mesh_file)?;
     cases.check(&mesh)?;
@@ -65,10 +65,10 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     let mut rows = row::rows(&label, &figures);
     let mut details = vec![json!({"method": label.drive, "cases": figures})];
     let mut all = Vec::new();
-    let methods = methods(plan, &bundles);
+    let methods = methods(options, &bundles);
     for method in &methods {
         let name = method.name();
-        match method.measure(plan.threads, &cases, &mesh, &truths, &mut yard) {
+        match method.measure(options.most_threads(), &cases, &mesh, &truths, &mut yard) {
             Ok((outcomes, figures)) => {
                 details.push(json!({"method": name, "cases": figures}));
                 rows.extend(row::rows(&label_of(method), &figures));
@@ -80,7 +80,7 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
     if all.is_empty() {
         bail!("nothing could be measured: {}", notes.join("; "));
     }
-    let viewer = film::viewer(&methods, &cases, &mesh, plan.threads)?;
+    let viewer = film::viewer(&methods, &cases, &mesh, options.most_threads())?;
     let made = Made {
         cases,
         mesh,
@@ -91,26 +91,26 @@ pub fn report(plan: &Plan) -> Result<ExitCode> {
         details,
         notes,
     };
-    let report = write(plan, &made)?;
-    if plan.json {
+    let report = write(options, &made)?;
+    if options.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
     } else {
         print!("{}", table::text(&made.rows));
         for note in &made.notes {
             println!("left out: {note}");
         }
-        println!("{}", plan.out.join("tools.html").display());
+        println!("{}", options.out.join("tools.html").display());
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn methods(plan: &Plan, bundles: &[BundleFolder]) -> Vec<Method> {
+fn methods(options: &Options, bundles: &[BundleFolder]) -> Vec<Method> {
     let mut methods = Vec::new();
     for bundle in bundles {
         let mut counts = match bundle.corrections {
             None => vec![Effort::NONE],
-            Some(recommended) if plan.corrections.is_empty() => vec![Effort::NONE, recommended],
-            Some(_) => plan.corrections.to_vec(),
+            Some(recommended) if options.corrections.is_empty() => vec![Effort::NONE, recommended],
+            Some(_) => options.corrections.to_vec(),
         };
         counts.dedup();
         let mut add = |drive, counts: &[Effort]| {

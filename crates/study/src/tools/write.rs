@@ -6,8 +6,10 @@ use anyhow::{Context, Result};
 use serde_json::json;
 use tissue::mesh::Mesh;
 
+use super::measured::Measured;
 use super::row::{ALL, Row};
-use super::{Measured, Plan, force, page, section, table};
+use super::{force, page, section, table};
+use crate::report::options::Options;
 use crate::table::Table;
 use upt_cli::counted::counted;
 use upt_cli::machine::Machine;
@@ -66,7 +68,7 @@ pub(super) struct Made {
 }
 
 /// Writes all of it; returns what tools.json holds.
-pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
+pub(super) fn write(options: &Options, made: &Made) -> Result<serde_json::Value> {
     let Made {
         cases,
         mesh,
@@ -77,15 +79,15 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
         details,
         notes,
     } = made;
-    std::fs::create_dir_all(&plan.out)
-        .with_context(|| format!("cannot make {}", plan.out.display()))?;
+    std::fs::create_dir_all(&options.out)
+        .with_context(|| format!("cannot make {}", options.out.display()))?;
     let machine = Machine::this();
     let header = &cases.list[0].trajectory.header;
     let date = crate::date::date();
     let report = json!({
         "machine": machine,
         "date": date,
-        "threads": plan.threads,
+        "threads": options.most_threads(),
         "versions": {"upt": env!("CARGO_PKG_VERSION"), "solver": header.solver},
         "mesh": {"name": header.mesh_name, "sha256": cases.mesh_sha256, "nodes": mesh.node_count(), "boundary": cases.boundary},
         "rows": rows,
@@ -93,7 +95,7 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
         "left_out": notes,
     });
     std::fs::write(
-        plan.out.join("tools.json"),
+        options.out.join("tools.json"),
         serde_json::to_string_pretty(&report)? + "\n",
     )?;
     let lead = format!(
@@ -108,7 +110,7 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
             format!("{}, {} cores, {}", machine.cpu, machine.cores, machine.os),
         ),
         ("date".into(), date.clone()),
-        ("threads".into(), plan.threads.to_string()),
+        ("threads".into(), options.most_threads().to_string()),
         (
             "versions".into(),
             format!(
@@ -128,7 +130,7 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
         ),
     ];
     let page = page::Page {
-        title: plan.title,
+        title: options.title.as_deref().unwrap_or("From pose to picture"),
         lead: lead.clone(),
         rows,
         keys: all
@@ -141,14 +143,14 @@ pub(super) fn write(plan: &Plan, made: &Made) -> Result<serde_json::Value> {
         notes: notes.iter().map(|n| format!("Left out: {n}")).collect(),
         facts,
     };
-    std::fs::write(plan.out.join("tools.html"), page::page(&page))?;
+    std::fs::write(options.out.join("tools.html"), page::page(&page))?;
     let made = format!(
         "{lead} {} ({}, {}), {date}.",
         machine.cpu,
         counted(machine.cores, "core"),
-        counted(plan.threads as usize, "thread")
+        counted(options.most_threads() as usize, "thread")
     );
-    for path in plan.markdown {
+    for path in &options.markdown {
         let cases = match header.boundary.as_str() {
             "fixed" => header.mesh_name.clone(),
             other => format!("{} --boundary {other}", header.mesh_name),

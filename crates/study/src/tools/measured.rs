@@ -1,0 +1,9 @@
+//! What came of a method.
+
+use upt_cli::yardstick::measure::Outcome;
+
+/// A method's cases.
+pub struct Measured {
+    pub name: String,
+    pub outcomes: Vec<Outcome>,
+}
