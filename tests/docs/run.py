@@ -106,6 +106,9 @@ def main() -> int:
         for block in blocks.marked(page):
             fault = blocks.fault(page, block, WORK, RELEASE)
             tally.add([fault] if fault else [])
+    old = results.ages()
+    if old:
+        print(f"{len(old)} measurements of docs/results are older than their code: python tests/docs/results.py ages")
     print(f"{tally.passed} passed, {tally.failed} failed, 0 skipped")
     return min(tally.failed, 1)
 

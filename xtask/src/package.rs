@@ -132,7 +132,15 @@ fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathB
         };
         install(workspace, (!is_host).then_some(platform), &built, &root)?;
         let program = if windows { "upt.exe" } else { "upt" };
-        copy(&built.join(program), &root.join("bin").join(program))?;
+        let command = root.join("bin").join(program);
+        copy(&built.join(program), &command)?;
+        if is_host && cfg!(target_os = "linux") {
+            run_checked(
+                workspace,
+                "strip",
+                workspace.command("strip", "").arg(&command),
+            )?;
+        }
         if windows && !is_host {
             cross::import_library(workspace, &built, &root.join("lib"))?;
         }
