@@ -1,4 +1,4 @@
-//! `upt mesh`: what a mesh is (`info`); `import` and `stuff` are in [`files`].
+//! `upt mesh`: what a mesh is (`info`); `import` and `stuff` are in `mesh/files.rs`.
 
 #[cfg(feature = "files")]
 mod files;
