@@ -53,7 +53,7 @@ pub struct Options {
     /// Make no corrections, though the bundle recommends some: the learned part alone. Not for --tools.
     #[arg(long, conflicts_with = "tools")]
     uncorrected: bool,
-    /// Page whose part between the markers `upt-study compare NAME` is replaced, and that of --tools between `upt-study compare --tools NAME`.
+    /// Page whose part between the markers `study compare NAME` is replaced, and that of --tools between `study compare --tools NAME`.
     #[arg(long)]
     markdown: Option<PathBuf>,
     /// Folder for the plots.

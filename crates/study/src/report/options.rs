@@ -44,7 +44,7 @@ pub struct Options {
     pub split: Split,
     /// Measure what a host shows between steps, at this many frames a second; --tools names datasets with frames shorter than a step
     /// (`upt dataset --tools all --frame-ms 5`). Writes shown.json and pictures; --markdown replaces the part between the markers
-    /// `upt-study report --shown BUNDLE`.
+    /// `study report --shown BUNDLE`.
     #[arg(long, value_name = "HZ", requires = "tools")]
     pub shown: Option<f64>,
     /// With --shown: time from a step's moment to the arrival of its state, ms.
@@ -52,14 +52,14 @@ pub struct Options {
     pub arrival_ms: f64,
     /// Lengths of a step, ms, 10 to 50. With --shown: also measure frames between such steps. Without: measure the error of the steps by their
     /// length, against frames shorter than a step; --markdown replaces the part between the markers
-    /// `upt-study report --step-ms BUNDLE`.
+    /// `study report --step-ms BUNDLE`.
     #[arg(long, value_name = "MS", value_delimiter = ',', requires = "tools")]
     pub step_ms: Vec<f64>,
-    /// Page whose part between the markers `upt-study report --tools MESH` (with `--boundary NAME` behind where it is not `fixed`) is replaced by the tables of --tools, or by a narrow table if the markers end in `summary` (repeat for several).
+    /// Page whose part between the markers `study report --tools MESH` (with `--boundary NAME` behind where it is not `fixed`) is replaced by the tables of --tools, or by a narrow table if the markers end in `summary` (repeat for several).
     #[arg(long, value_name = "FILE")]
     pub markdown: Vec<PathBuf>,
     /// Measure programmes of loads (tilt, pulse, sag, breathe) in the bundles of --bundle against the reference solver, which runs here. --markdown replaces the
-    /// part between the markers `upt-study report --load`.
+    /// part between the markers `study report --load`.
     #[arg(long, value_delimiter = ',', conflicts_with_all = ["trajectories", "data", "tools"])]
     pub load: Vec<LoadProgramme>,
     /// Measure so many cases of a bed of ties that a thread tears node by node, in the bundles of --bundle against the reference solver, which runs here. --markdown
