@@ -4,7 +4,7 @@
 use super::{Iterate, SUNK_MM, lost_by};
 use crate::contact::ContactProblem;
 use crate::corrections::input::{Input, Report, SolverContext};
-use crate::corrections::solver::ImplicitSolver;
+use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 
 impl ImplicitSolver {
@@ -40,7 +40,15 @@ impl ImplicitSolver {
         }
         problem.take_guess();
         at.u.copy_from_slice(&self.guess);
-        self.evaluate(context, input, at, report)
+        self.evaluate(context, input, at, report)?;
+        // What a linear response of the intact body makes of loose lips is no tissue: a tool that has lost the contact there pushes its way in from
+        // the last state, in the steps that follow.
+        let is_cut = !context.corrections.changed.is_empty();
+        let was_sound = self.motion.min_det >= SMALLEST_DET && !input.still;
+        match is_cut && was_sound && at.det < SMALLEST_DET {
+            true => self.stay(context, input, problem, at, report),
+            false => Ok(()),
+        }
     }
 
     /// What stands if nothing better is found.
