@@ -28,7 +28,7 @@ pub mod tool;
 
 pub(crate) use compliance::Delassus;
 pub use compliance::{Compliance, Tangent};
-pub use past::Past;
+pub use past::{Force, Past};
 pub use problem::ContactProblem;
 pub(crate) use rows::{Pair, outward};
 pub use state::State;

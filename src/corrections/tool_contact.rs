@@ -214,6 +214,9 @@ impl ImplicitSolver {
         if self.motion.min_det < SMALLEST_DET && !input.still {
             return self.respond_from_rest(context, input, problem, at, report);
         }
+        if problem.has_grasp() && !context.corrections.changed.is_empty() {
+            return self.guess_freely(context, input, problem, at, report);
+        }
         let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
         let ways = problem.parts();
         // A tool that leapt has no way to be taken in parts.
@@ -258,6 +261,26 @@ impl ImplicitSolver {
             }
             iterated *= 2;
         }
+    }
+
+    /// The free motion alone, under the forces that there were: the linear response is the intact body's, in which both lips of a cut are one, and what
+    /// holds them both would pull them apart.
+    fn guess_freely(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        problem: &mut ContactProblem,
+        at: &mut Iterate<'_>,
+        report: &mut Report,
+    ) -> Result<()> {
+        let env = context.env();
+        problem.restart();
+        at.u.copy_from_slice(input.last);
+        self.add_gravity(context, input, at.u)?;
+        self.move_freely(env)?;
+        self.settle(env, at.u)?;
+        report.parts = 1;
+        self.evaluate(context, input, at, report)
     }
 
     /// The coordinates become `-N diag(1 / (m (w² + kappa))) N^T [I_{n+1}(u_n) - I_n]`: what the natural modes do by themselves.

@@ -14,7 +14,7 @@ use super::core::{Core, SCENE, lock_read, lock_write};
 use super::cut_state::CutState;
 use super::published::{BodyNumber, CutModel, Frame, Published};
 use crate::bundle::Mesh;
-use crate::contact::Past;
+use crate::contact::{Force, Past};
 use crate::corrections::{History, Linearisation, Motion};
 use crate::error::{Error, Result};
 use crate::haptics::publish::tissue::HandTissue;
@@ -322,11 +322,30 @@ impl Core {
         let Some(problem) = &before.problem else {
             return Ok(());
         };
-        // Samples have other numbers: forces are found anew, and a grasp lets go.
+        // The same points of the tissue have other rows, with what pushes and holds them.
         let mut past: Past = problem.past.copy()?;
-        past.forces.clear();
+        let held = past.tools.iter().flat_map(|held| held.grasp.anchors());
+        let pushed = past.forces.iter().map(|force| force.sample);
+        let count = held.clone().count() + past.forces.len();
+        let all = held.map(|own| own.sample).chain(pushed);
+        let mut rows = memory::collected(count, all, SCENE)?;
+        rows.sort_unstable();
+        rows.dedup();
+        let samples = [before.model.samples()?, self.model.samples()?];
+        let found = ::contact::followed(&samples[0], &samples[1], &rows);
+        let found = memory::tried(found, SCENE)?;
+        let renamed = |row: u32| rows.binary_search(&row).ok().and_then(|at| found[at]);
+        past.forces.retain_mut(|force| match renamed(force.sample) {
+            Some(row) => {
+                force.sample = row;
+                true
+            }
+            None => false,
+        });
+        past.forces.sort_unstable_by_key(Force::key);
+        past.forces.dedup_by_key(|force| force.key());
         for held in &mut past.tools {
-            held.grasp.open();
+            held.grasp.rename(renamed);
         }
         self.put_tools(Some(past))
     }

@@ -2,6 +2,7 @@
 #![cfg(feature = "instruments")]
 
 mod cut_blade;
+mod cut_grasp;
 mod cut_loads;
 mod cut_operations;
 mod cut_scenes;

@@ -79,6 +79,19 @@ impl Grasp {
         self.anchors = anchors;
     }
 
+    /// The samples have other rows: `to` gives those of now, and what has none is let go.
+    pub fn rename(&mut self, to: impl Fn(u32) -> Option<u32>) {
+        self.anchors.retain_mut(|anchor| match to(anchor.sample) {
+            Some(sample) => {
+                anchor.sample = sample;
+                true
+            }
+            None => false,
+        });
+        self.anchors.sort_unstable_by_key(|anchor| anchor.sample);
+        self.anchors.dedup_by_key(|anchor| anchor.sample);
+    }
+
     /// Lets go.
     pub fn open(&mut self) {
         self.anchors.clear();

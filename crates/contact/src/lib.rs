@@ -15,6 +15,7 @@
 
 pub mod body;
 mod error;
+mod follow;
 pub mod friction;
 pub mod grasp;
 mod nearest;
@@ -28,6 +29,7 @@ mod triangles;
 
 pub use body::{Body, Nearest};
 pub use error::ShapeError;
+pub use follow::followed;
 pub use grasp::Grasp;
 pub use nearest::nearest;
 pub use parry3d::math::{Matrix, Pose, Rotation, Vector};

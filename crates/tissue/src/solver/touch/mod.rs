@@ -120,7 +120,7 @@ pub(super) struct Touch {
 }
 
 impl Touch {
-    /// Nodes have been added, and lie elsewhere; the touchable faces are others. What is grasped is let go.
+    /// Nodes have been added, and lie elsewhere; the touchable faces are others. What is grasped is held on at the nodes that there were.
     pub fn follow(&mut self, positions: &[[f32; 3]], slot_of_node: &[u32], samples: Samples) {
         self.rows.clear();
         self.before.clear();
@@ -128,8 +128,14 @@ impl Touch {
         self.sums.clear();
         self.search = Search::default();
         for tool in &mut self.tools {
-            tool.grasp = Grasp::default();
-            tool.torn = tool.closed;
+            let rows: Vec<u32> = (tool.grasp.anchors().iter())
+                .map(|anchor| anchor.sample)
+                .collect();
+            let found = contact::followed(&self.scene.samples, &samples, &rows);
+            let found = found.unwrap_or_default();
+            let renamed = |row| rows.binary_search(&row).ok().and_then(|at| *found.get(at)?);
+            tool.grasp.rename(renamed);
+            tool.torn |= tool.closed && tool.grasp.anchors().is_empty();
         }
         self.scene = Arc::new(Scene {
             samples,
