@@ -15,6 +15,7 @@
 //! the domain. The iterations are local ([`super::local`]), in rounds that each begin with an evaluation of all elements.
 
 mod fall_back;
+mod freely;
 mod rounds;
 
 use super::input::{Input, Report, SolverContext};
@@ -261,26 +262,6 @@ impl ImplicitSolver {
             }
             iterated *= 2;
         }
-    }
-
-    /// The free motion alone, under the forces that there were: the linear response is the intact body's, in which both lips of a cut are one, and what
-    /// holds them both would pull them apart.
-    fn guess_freely(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<()> {
-        let env = context.env();
-        problem.restart();
-        at.u.copy_from_slice(input.last);
-        self.add_gravity(context, input, at.u)?;
-        self.move_freely(env)?;
-        self.settle(env, at.u)?;
-        report.parts = 1;
-        self.evaluate(context, input, at, report)
     }
 
     /// The coordinates become `-N diag(1 / (m (w² + kappa))) N^T [I_{n+1}(u_n) - I_n]`: what the natural modes do by themselves.

@@ -3,7 +3,7 @@
 
 use std::sync::RwLock;
 
-use super::core::{Core, lock_write};
+use super::core::{Core, lock_read, lock_write};
 use super::inversion::ContactElements;
 use super::published::Published;
 use super::timing::Stopwatch;
@@ -116,7 +116,11 @@ impl Core {
         }
         let would_repeat = self.incoming.is_empty() && !was_given;
         if policy == GuardPolicy::Blend || would_repeat {
-            self.fall_back()?;
+            match self.cut.is_some() {
+                // The linear response is the intact body's, and inverts loose lips: the last good state stays.
+                true => (self.next.field).copy_from_slice(&lock_read(published).last.field),
+                false => self.fall_back()?,
+            }
             self.next.points.fill(0.0);
             let sound = self.largest_of_next() <= bound;
             if !sound {

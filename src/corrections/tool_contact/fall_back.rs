@@ -43,12 +43,17 @@ impl ImplicitSolver {
         self.evaluate(context, input, at, report)?;
         // What a linear response of the intact body makes of loose lips is no tissue: a tool that has lost the contact there pushes its way in from
         // the last state, in the steps that follow.
-        let is_cut = !context.corrections.changed.is_empty();
-        let was_sound = self.motion.min_det >= SMALLEST_DET && !input.still;
-        match is_cut && was_sound && at.det < SMALLEST_DET {
-            true => self.stay(context, input, problem, at, report),
-            false => Ok(()),
+        let found = at.det;
+        if context.corrections.changed.is_empty() || found >= SMALLEST_DET || input.still {
+            return Ok(());
         }
+        self.stay(context, input, problem, at, report)?;
+        if at.det > found {
+            return Ok(());
+        }
+        problem.take_guess();
+        at.u.copy_from_slice(&self.guess);
+        self.evaluate(context, input, at, report)
     }
 
     /// What stands if nothing better is found.
