@@ -28,10 +28,11 @@ namespace Upt.Tests
                 Assert.That(ties.Length, Is.GreaterThan(2));
                 int last = ties.Length;
                 Array.Resize(ref ties, last + 1);
-                ties[last] = scene.TieAt(x, y, z);
-                ties[last].place[2] = z + 3f;
-                ties[last].stiffness = 5f;
-                ties[last].slack_mm = 1f;
+                upt_tie thread = scene.TieAt(x, y, z);
+                thread.place[2] = z + 3f;
+                thread.stiffness = 5f;
+                thread.slack_mm = 1f;
+                ties[last] = thread;
                 StepInput input = new StepInput { Ties = ties };
                 float[] field = new float[3 * scene.NodeCount];
                 for (int step = 0; step < 5; step++) scene.Step(input, field);
