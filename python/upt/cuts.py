@@ -52,7 +52,8 @@ class Blade:
         record.fracture_energy = number(self.fracture_energy, "fracture_energy")
         record.threshold = number(self.threshold, "threshold")
         record.pushed = number(self.pushed, "pushed")
-        record.ahead = [number(x, "ahead") for x in self.ahead]
+        x, y, z = self.ahead
+        record.ahead = (number(x, "ahead"), number(y, "ahead"), number(z, "ahead"))
         return record
 
 

@@ -74,7 +74,7 @@ impl ImplicitSolver {
         substeps: Option<(&mut Substeps, &mut Substepper)>,
         next: &mut [f32],
     ) -> Result<Report> {
-        problem.end_by(input.enough.until);
+        problem.work.end_by(input.enough.until);
         let Some((substeps, substepper)) = substeps else {
             return self.correct_loaded(context, input, problem, next);
         };

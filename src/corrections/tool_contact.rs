@@ -161,7 +161,7 @@ impl ImplicitSolver {
         problem.keep_guess()?;
         let mut size = self.improve_loaded(context, input, problem, at, report)?;
         let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
-        if !is_sound(size, at.det) && sound && !problem.is_spent() {
+        if !is_sound(size, at.det) && sound && !problem.work.is_spent() {
             // The guess inverts, however short its parts: the tools push their way in by iterations alone.
             self.stay(context, input, problem, at, report)?;
             size = self.improve_loaded(context, input, problem, at, report)?;
@@ -237,7 +237,7 @@ impl ImplicitSolver {
                 self.press(context, input, problem, way, at.u)?;
                 // An iteration after each of `iterated` parts of the load but the last.
                 let due = part * iterated / parts > last * iterated / parts;
-                let spent = problem.is_spent() || is_spent(input, problem, report, 1);
+                let spent = problem.work.is_spent() || is_spent(input, problem, report, 1);
                 if due && part < parts && !spent {
                     self.settle(env, at.u)?;
                     self.evaluate(context, input, at, report)?;
@@ -255,7 +255,7 @@ impl ImplicitSolver {
             report.parts = parts;
             if at.det > least
                 || iterated >= most
-                || problem.is_spent()
+                || problem.work.is_spent()
                 || is_spent(input, problem, report, 1)
             {
                 return Ok(());
@@ -287,10 +287,10 @@ impl ImplicitSolver {
             false => MORE_PRESSES,
         };
         for _ in 0..most {
-            if left <= most_mm || left == f32::MAX || problem.is_spent() {
+            if left <= most_mm || left == f32::MAX || problem.work.is_spent() {
                 break;
             }
-            problem.charge(PRESS_WORK);
+            problem.work.charge(PRESS_WORK);
             self.preconditioner.coordinates.fill(0.0);
             self.press(context, input, problem, 1.0, u)?;
             self.settle(context.env(), u)?;

@@ -274,7 +274,7 @@ impl Core {
         if readings
             .clone()
             .any(|reading| reading.residual_mm > UNSOLVED_MM)
-            || problem.is_cut_short()
+            || problem.work.is_cut_short()
         {
             stats.flags |= flag::UNSOLVED;
         }

@@ -25,6 +25,8 @@ const POINTED_MM: f32 = 0.2;
 const MOST_CORNERS: usize = 64;
 /// Ways along a line are followed at least by this, mm: what a line cuts off less deeply is missed.
 const GRAZING_MM: f32 = 0.02;
+/// Steps of a march along a line at most: one from a point that is not finite, or far beyond what f32 resolves, would not end.
+const MOST_MARCHES: u32 = 4096;
 
 #[derive(Clone, Debug)]
 enum Core {
@@ -271,12 +273,15 @@ impl Body {
     pub fn way_out(&self, pose: &Pose, from: Vector, direction: Vector, limit: f32) -> Option<f32> {
         let mut length = 0.0;
         // Inside, the surface is at least `-distance` away in any direction.
-        while length <= limit {
+        for _ in 0..MOST_MARCHES {
             let distance = self.nearest_at(pose, from + direction * length).distance;
             if distance >= -1e-3 {
                 return Some(length);
             }
             length -= distance;
+            if length > limit {
+                break;
+            }
         }
         None
     }
@@ -316,12 +321,15 @@ impl Body {
         limit: f32,
     ) -> Option<f32> {
         let mut length = 0.0;
-        while length <= limit {
+        for _ in 0..MOST_MARCHES {
             let distance = self.nearest_at(pose, from + direction * length).distance;
             if distance < 0.0 {
                 return Some(length);
             }
             length += distance.max(GRAZING_MM);
+            if length > limit {
+                break;
+            }
         }
         None
     }

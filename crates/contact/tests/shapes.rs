@@ -321,3 +321,18 @@ fn a_hull_with_a_point_ends_there_in_a_ball() {
     assert!((distance(0.0, -19.0) + 1.0).abs() < 1e-3);
     assert!(hull.pierces() && !hull.is_broad() && hull.finest() == 1.0);
 }
+
+#[test]
+fn a_march_that_leads_nowhere_ends() {
+    let ball = Body::new(&Shape::Sphere { radius: 2.0 }).unwrap();
+    let way = |x: f32, limit: f32| {
+        let from = Vector::new(x, 0.0, 0.0);
+        ball.way_through(&contact::Pose::IDENTITY, from, Vector::X, limit)
+    };
+    let through = way(-5.0, f32::INFINITY).unwrap();
+    assert!((through - 7.0).abs() < 1e-2, "{through}");
+    // From a state that is not finite, along the ball's side, and from where a step of f32 is longer than the ball.
+    assert_eq!(way(f32::NAN, f32::INFINITY), None);
+    assert_eq!(way(3.0, f32::INFINITY), None);
+    assert_eq!(way(1e9, f32::INFINITY), None);
+}

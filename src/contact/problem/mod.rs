@@ -96,9 +96,10 @@ pub struct ContactProblem {
     guessed: Vec<Force>,
     /// Where the tools came from, while they take another way.
     ways: Vec<(Pose, bool, Option<Buried>)>,
-    /// What the solves of this step took, what is left to it, and what the last of them left unsolved, mm.
+    /// What the step may still cost.
+    pub work: Work,
+    /// What its solves took, and what the last of them left unsolved, mm.
     spent: Duration,
-    work: Work,
     unsolved_mm: f32,
     /// A tool lay in the tissue when the step, or a part of it, began.
     pub lay_in_tissue: bool,
@@ -342,7 +343,7 @@ impl ContactProblem {
     /// In how many parts the tools' ways are taken: no tool may pass a sample between two looks, and none may push it over its own
     /// edge.
     pub fn parts(&self) -> u32 {
-        if self.is_spent() {
+        if self.work.is_spent() {
             return LEAST_PARTS;
         }
         let parts = self.tools.iter().zip(&self.before).map(|(tool, from)| {
@@ -354,7 +355,7 @@ impl ContactProblem {
 
     /// The part of `parts` to take after part `part`: the next, or one of [`LEAST_PARTS`] once the solves have taken their time.
     pub fn next_part(&self, part: u32, parts: u32) -> u32 {
-        let stride = match self.is_spent() {
+        let stride = match self.work.is_spent() {
             true => parts.div_ceil(LEAST_PARTS),
             false => 1,
         };

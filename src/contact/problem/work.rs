@@ -2,7 +2,6 @@
 //!
 //! Work is counted and not timed, so that a step has the same bits on every machine; only a host's budget is a time.
 
-use super::ContactProblem;
 use crate::clock::Instant;
 use crate::memory::HeldBytes;
 
@@ -19,7 +18,7 @@ const LEAP_WORK: u64 = 60_000_000;
 
 /// What is left to the step being made.
 #[derive(Debug, HeldBytes)]
-pub(super) struct Work {
+pub struct Work {
     solves: u64,
     step: u64,
     /// The whole step's work is bounded.
@@ -79,40 +78,37 @@ impl Work {
         self.solves.min(in_time)
     }
 
-    fn is_spent(&self) -> bool {
-        let is_late = || self.until.is_some_and(|until| Instant::now() >= until);
-        self.solves == 0 || self.step == 0 || is_late()
-    }
-}
-
-impl ContactProblem {
     /// Sets when the step's budget of time ends. From then on its solves take the least work.
     pub fn end_by(&mut self, until: Option<Instant>) {
-        self.work.until = until;
+        self.until = until;
     }
 
     /// Whether the solves of this step have taken their work or time, or the whole of it has.
     pub fn is_spent(&self) -> bool {
-        self.work.is_spent()
+        self.solves == 0 || self.step == 0 || self.is_late()
     }
 
-    /// Whether the whole step's work is bounded: a tool has leapt, or lay in the tissue when the step began.
-    pub fn is_bounded(&self) -> bool {
-        self.work.is_bounded
+    fn is_late(&self) -> bool {
+        self.until.is_some_and(|until| Instant::now() >= until)
+    }
+
+    /// Whether the step's time is, or its whole work where that is bounded, and nothing more is to be tried.
+    pub fn is_over(&self) -> bool {
+        self.is_bounded && (self.step == 0 || self.is_late())
     }
 
     /// Takes what iterations have cost off the work of the whole step, in multiplications.
     pub fn charge(&mut self, work: u64) {
-        self.work.step = self.work.step.saturating_sub(work);
+        self.step = self.step.saturating_sub(work);
     }
 
     /// Whether the whole step has so much work left.
     pub fn affords(&self, work: u64) -> bool {
-        self.work.step >= work
+        self.step >= work
     }
 
     /// Whether the whole step's work is done, and what it left out is to be told.
     pub fn is_cut_short(&self) -> bool {
-        self.work.step == 0
+        self.step == 0
     }
 }

@@ -33,7 +33,9 @@ impl LocalSolver {
         self.descend(step, problem)?;
         self.solve_contact(step, problem, base, way)?;
         let made = self.columns.count().saturating_sub(known) as u64;
-        problem.charge(ITERATION_WORK * self.near.nodes.len() as u64 + COLUMN_WORK * made);
+        problem
+            .work
+            .charge(ITERATION_WORK * self.near.nodes.len() as u64 + COLUMN_WORK * made);
         let stiff = &mut self.d_stiff;
         step.preconditioner.stiffen(env, &self.d.c, stiff)?;
         self.near.linear(env, &self.d_modes, &mut self.d_linear);
@@ -44,7 +46,9 @@ impl LocalSolver {
         for attempt in 0..=SHORTENINGS {
             self.place_at(base, t);
             let det = self.evaluate(step, t)?;
-            problem.charge(EVALUATION_WORK * self.near.nodes.len() as u64);
+            problem
+                .work
+                .charge(EVALUATION_WORK * self.near.nodes.len() as u64);
             let slope_new = self.next.over(&self.d) - work;
             let sunk_mm = match det > SMALLEST_DET {
                 true => sunk(problem, &self.trial),

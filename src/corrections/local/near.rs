@@ -23,7 +23,7 @@ pub(in crate::corrections) const LEVELS: usize = 4;
 const WIDER: [f32; LEVELS] = [1.0, 1.5, 2.25, f32::INFINITY];
 /// A set is too narrow where the far nodes are smoothed by more than this part of how far the touched ones have been pushed.
 const FAR_PART: f32 = 6e-5;
-/// A level beyond the first is not taken with more nodes than these, but the widest below it that has fewer: an iteration costs what is near.
+/// A level beyond the first is not taken with more nodes than these, but the widest below it that has fewer.
 const MOST_NODES: usize = 4500;
 /// Where a larger part of the nodes would be near, all are, and so they are in a body of fewer nodes: whole, it costs no more than its modes do.
 const LARGEST_PART: f32 = 0.5;
@@ -207,9 +207,8 @@ impl NearSet {
         }
         let reach = |level: usize| WIDER[level] * REACH_MM.max(REACH_EDGES * far.edge_mm);
         let fits = |level: &usize| {
-            let reach = reach(*level);
             let nodes = 0..self.places.len() as u32;
-            let near = nodes.filter(|node| is_by(rest, &self.chosen, *node, reach));
+            let near = nodes.filter(|node| is_by(rest, &self.chosen, *node, reach(*level)));
             near.take(MOST_NODES + 1).count() <= MOST_NODES
         };
         reach((1..=level).rev().find(fits).unwrap_or(0))

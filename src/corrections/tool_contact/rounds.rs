@@ -43,7 +43,7 @@ impl ImplicitSolver {
             report.residual = 1.0;
             return Ok(f64::INFINITY);
         }
-        if problem.is_spent() {
+        if problem.work.is_spent() {
             // No iteration would begin, and its base takes as long as several.
             report.residual = 1.0;
             return Ok(0.0);
@@ -54,7 +54,7 @@ impl ImplicitSolver {
             self.end_round(context, input, problem, at)?;
             let most = input.enough.iterations;
             let again = self.local.as_ref().map_or(0, |local| local.begin_work());
-            let affords = !problem.is_spent() && problem.affords(again);
+            let affords = !problem.work.is_spent() && problem.work.affords(again);
             if made.is_enough || made.iterations >= most || !affords {
                 break;
             }
@@ -94,7 +94,7 @@ impl ImplicitSolver {
             let until = input.enough.until;
             let late = until.is_some_and(|until| Instant::now() >= until);
             let spent = late || is_spent(input, problem, report, input.enough.iterations);
-            let spent = problem.is_spent() || (made.iterations > 0 && spent);
+            let spent = problem.work.is_spent() || (made.iterations > 0 && spent);
             if spent || !is_sound(made.size, at.det) {
                 return Ok(());
             }
@@ -143,7 +143,7 @@ impl ImplicitSolver {
         let generation = local.factor.generation;
         let begun = local.begin(&mut step, base);
         if local.factor.generation != generation {
-            problem.charge(local.begin_work());
+            problem.work.charge(local.begin_work());
         }
         begun
     }

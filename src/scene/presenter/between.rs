@@ -286,7 +286,7 @@ impl Between {
             response.add(change, &mut self.natural, false, q)?;
             // As in a step: a quick or thin tool that has lost the contact is pressed again about where the tissue has come to.
             for _ in 0..MORE_PRESSES {
-                if !self.problem.may_lose() || self.problem.is_spent() {
+                if !self.problem.may_lose() || self.problem.work.is_spent() {
                     break;
                 }
                 let means = (self.isa, &self.pool, &**prior);
