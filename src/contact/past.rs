@@ -16,7 +16,7 @@ const WHAT: &str = "the forces of instruments";
 /// The force on one sample, mN.
 #[derive(Clone, Copy, Debug, PartialEq, HeldBytes, Serialize, Deserialize)]
 pub struct Force {
-    /// Place in the list of tools; of a tie none ([`NO_TOOL`]).
+    /// Place in the list of tools; of a tie none (`NO_TOOL`).
     pub tool: u32,
     /// Row of the samples, or of a tie.
     pub sample: u32,

@@ -36,7 +36,7 @@ pub struct Loads<'a> {
     /// Where what holds the body is at the end of the step, where it moves. All else stays in the mesh's frame, which goes with the support: displacements,
     /// tools, forces. The body feels the motion as inertia. Pass it in every step; one that goes farther than 40 mm or half a radian in a step is put there.
     pub support: Option<SupportPose>,
-    /// Ties of the tissue, at most [`MAX_TIES`], beside tools or without any. A tie's place in the list is its identity: pass every tie in every step, in the same order.
+    /// Ties of the tissue, at most 256, beside tools or without any. A tie's place in the list is its identity: pass every tie in every step, in the same order.
     /// A broken one stays broken in its place, until it has a stiffness of 0 there or the list ends before it.
     pub ties: &'a [Tie],
 }
