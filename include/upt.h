@@ -328,7 +328,7 @@
 
 /**
  * The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings), or the whole step
- * of a tool that leapt or lay in the tissue was.
+ * of a tool that leapt more than 40 mm was.
  */
 #define UPT_FLAG_UNSOLVED 16384
 

@@ -211,8 +211,7 @@ impl ContactProblem {
         self.unsolved_mm = 0.0;
         self.lay_in_tissue = false;
         self.enter(tools, ties, rest, start)?;
-        let is_bounded = self.has_leapt || self.lay_in_tissue;
-        self.work = Work::of(self.may_lose(), is_bounded, self.tied.work());
+        self.work = Work::of(self.may_lose(), self.has_leapt, self.tied.work());
         Ok(())
     }
 

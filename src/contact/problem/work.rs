@@ -13,7 +13,7 @@ const SOLVES_WORK: u64 = 20_000_000;
 const LONGEST_SOLVES_WORK: u64 = 3 * SOLVES_WORK;
 /// What is left when solves begin to take fewer samples.
 const SHORT_OF_WORK: u64 = SOLVES_WORK / 2;
-/// Work of a whole step at most, its iterations included, in which a tool leaps or lay in the tissue: about fifteen milliseconds.
+/// Work of a whole step at most, its iterations included, in which a tool leaps: about fifteen milliseconds.
 const LEAP_WORK: u64 = 60_000_000;
 
 /// What is left to the step being made.
@@ -38,7 +38,7 @@ impl Work {
         }
     }
 
-    /// Of a step whose tools may lose their contact, or leap or lay in the tissue; `more` for ties.
+    /// Of a step whose tools may lose their contact, or leap; `more` for ties.
     pub fn of(may_lose: bool, is_bounded: bool, more: u64) -> Work {
         let solves = match may_lose {
             true => SOLVES_WORK,
@@ -85,16 +85,13 @@ impl Work {
 
     /// Whether the solves of this step have taken their work or time, or the whole of it has.
     pub fn is_spent(&self) -> bool {
-        self.solves == 0 || self.step == 0 || self.is_late()
+        let is_late = || self.until.is_some_and(|until| Instant::now() >= until);
+        self.solves == 0 || self.step == 0 || is_late()
     }
 
-    fn is_late(&self) -> bool {
-        self.until.is_some_and(|until| Instant::now() >= until)
-    }
-
-    /// Whether the step's time is, or its whole work where that is bounded, and nothing more is to be tried.
+    /// Whether a step whose whole work is bounded has taken its work or time, so that nothing more is to be tried.
     pub fn is_over(&self) -> bool {
-        self.is_bounded && (self.step == 0 || self.is_late())
+        self.is_bounded && self.is_spent()
     }
 
     /// Takes what iterations have cost off the work of the whole step, in multiplications.

@@ -743,7 +743,7 @@ namespace Upt.Interop
         public const uint UPT_FLAG_DEEP = 8192;
         /// <summary>
         /// The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings), or the whole step
-        /// of a tool that leapt or lay in the tissue was.
+        /// of a tool that leapt more than 40 mm was.
         /// </summary>
         public const uint UPT_FLAG_UNSOLVED = 16384;
         /// <summary>Nodes of the surface.</summary>
