@@ -112,21 +112,21 @@ impl ContactProblem {
 
     /// Adds the free nodes of the ties that pull to `nodes`.
     pub(super) fn add_tied_nodes(&mut self, held: &[bool]) {
-        let pulling = Pulling {
-            ties: &self.tied.list,
-            held: &self.next.ties,
-            from: &self.tied.from,
-            tools: &self.tools,
-            before: &self.before,
-            step_s: self.tied.step_s,
-        };
-        for (index, placed) in self.tied.list.iter().enumerate() {
-            if pulling.is_whole(index) {
-                let nodes = placed.row().into_entries().map(|entry| entry.0);
+        for index in 0..self.tied.list.len() {
+            if self.pulling().is_whole(index) {
+                let nodes = self.tied.list[index].row().into_entries();
+                let nodes = nodes.map(|entry| entry.0);
                 self.nodes
                     .extend(nodes.filter(|node| !held[*node as usize]));
             }
         }
+    }
+
+    /// From a tie's far end to its point at `state`, the end of the step; none where its tool is gone.
+    fn way_of_tie(&self, index: usize, state: State<'_>) -> Option<Vector> {
+        let row = self.tied.list[index].row();
+        let point = row.gather(|node| state.position(node));
+        self.pulling().end(index, 1.0).map(|end| point - end)
     }
 
     /// Sums up what each tie does at `state`, the end of the step; with `breaks` those break that are pulled too hard, the hardest first: others
@@ -135,9 +135,7 @@ impl ContactProblem {
         self.tied.broke = false;
         let mut hardest = 0.0f32;
         for index in 0..self.tied.list.len() {
-            let row = self.tied.list[index].row();
-            let point = row.gather(|node| state.position(node));
-            let way = self.pulling().end(index, 1.0).map(|end| point - end);
+            let way = self.way_of_tie(index, state);
             let force = Force::of_tie(&self.next.forces, index);
             let held = &mut self.next.ties[index];
             held.reading = TieReading {
@@ -152,9 +150,7 @@ impl ContactProblem {
             return;
         }
         for index in 0..self.tied.list.len() {
-            let row = self.tied.list[index].row();
-            let point = row.gather(|node| state.position(node));
-            let way = self.pulling().end(index, 1.0).map(|end| point - end);
+            let way = self.way_of_tie(index, state);
             let held = &mut self.next.ties[index];
             if strain(held, way) > (TOGETHER * hardest).max(1.0) {
                 held.broken = true;

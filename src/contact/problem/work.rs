@@ -99,13 +99,40 @@ impl Work {
         self.step = self.step.saturating_sub(work);
     }
 
-    /// Whether the whole step has so much work left.
-    pub fn affords(&self, work: u64) -> bool {
-        self.step >= work
+    /// Whether the whole step has so much work left; where it has not, it is cut short.
+    pub fn affords(&mut self, work: u64) -> bool {
+        let has = self.step >= work;
+        if !has {
+            self.step = 0;
+        }
+        has
     }
 
     /// Whether the whole step's work is done, and what it left out is to be told.
     pub fn is_cut_short(&self) -> bool {
         self.step == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_leap_cannot_afford_is_told() {
+        let mut work = Work::of(true, true, 0);
+        assert!(work.affords(LEAP_WORK) && !work.is_cut_short());
+        assert!(!work.affords(LEAP_WORK + 1));
+        assert!(work.is_cut_short() && work.is_spent() && work.is_over());
+    }
+
+    #[test]
+    fn a_step_without_a_leap_is_not_bounded_as_a_whole() {
+        let mut work = Work::of(true, false, 0);
+        work.charge(u64::MAX / 2);
+        assert!(work.affords(LEAP_WORK) && !work.is_spent());
+        // Its solves are, and then nothing is cut short that a reading does not tell.
+        work.take(SOLVES_WORK);
+        assert!(work.is_spent() && !work.is_over() && !work.is_cut_short());
     }
 }

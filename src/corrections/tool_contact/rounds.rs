@@ -54,8 +54,8 @@ impl ImplicitSolver {
             self.end_round(context, input, problem, at)?;
             let most = input.enough.iterations;
             let again = self.local.as_ref().map_or(0, |local| local.begin_work());
-            let affords = !problem.work.is_spent() && problem.work.affords(again);
-            if made.is_enough || made.iterations >= most || !affords {
+            let is_done = made.is_enough || made.iterations >= most || problem.work.is_spent();
+            if is_done || !problem.work.affords(again) {
                 break;
             }
             self.evaluate(context, input, at, report)?;
