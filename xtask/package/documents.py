@@ -26,6 +26,8 @@ PAGES = [
     "README.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",
+    "CODE_OF_CONDUCT.md",
+    "SECURITY.md",
     "NOTICE",
     "examples/README.md",
     "python/README.md",
