@@ -29,11 +29,21 @@ check unity_package cargo xtask package --unity --out "$work/dist"
 archive="$(find "$work/dist" -name 'libupt-*.tar.gz' | head -n 1)"
 # The same commit gives the same bytes.
 check archive_again cargo xtask package --out "$work/again"
-check same_bytes cmp "${archive:-none}" "$work/again/$(basename "${archive:-none}")"
+same_bytes() {
+  local ending name
+  name="$(basename "${archive:-none}")"
+  for ending in "" .cdx.json .spdx.json; do
+    cmp "$work/dist/$name$ending" "$work/again/$name$ending" || return 1
+  done
+}
+check same_bytes same_bytes
+checksums() { (cd "$work/dist" && sha256sum --check --strict SHA256SUMS); }
+check checksums checksums
 check unpack tar -xzf "${archive:-none}" -C "$work/elsewhere"
 # Nothing may depend on where the archive was made.
 rm -rf "$work"/dist/libupt-*/ "$work/again"
 prefix="$(find "$work/elsewhere" -mindepth 1 -maxdepth 1 -type d | head -n 1)"
+check bill_of_materials python3 tests/package/sbom.py "${archive:-none}" "$prefix"
 unset ORT_DYLIB_PATH LD_LIBRARY_PATH UPT_LIB_DIR UPT_INCLUDE_DIR UPT_BUNDLES
 cd "$work/elsewhere" || exit 1
 

@@ -7,14 +7,13 @@ crates.io leave the text out and only name the licence: then it is the standard 
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "xtask/package"))
+from crates import Crate, linked  # noqa: E402
 
 # Licences under which a crate may be linked. MPL-2.0 is of each file by itself: it asks for the text and for where the
 # source is, and nothing of what links it.
@@ -26,44 +25,29 @@ HEAD = (
 )
 
 
-def cargo(*words: str) -> str:
-    """What cargo prints."""
-    command = [os.environ.get("CARGO", "cargo"), *words]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=True).stdout
-
-
-def linked() -> list[dict]:
-    """What `cargo tree` links of other people's crates, as `cargo metadata` describes it."""
-    tree = cargo(*"tree -p upt -p upt-cli --edges normal --prefix none --format {p}".split())
-    names = {tuple(line.split()[:2]) for line in tree.splitlines() if "(proc-macro)" not in line}
-    packages = json.loads(cargo("metadata", "--format-version", "1"))["packages"]
-    found = [one for one in packages if one["source"] and (one["name"], "v" + one["version"]) in names]
-    return sorted(found, key=lambda package: (package["name"], package["version"]))
-
-
 def is_accepted(expression: str) -> bool:
     """True where one side of every `AND` has an accepted choice."""
     plain = re.sub(r"[()]", " ", expression or "").replace("/", " OR ")
     return all(any(choice.strip() in ACCEPTED for choice in part.split(" OR ")) for part in plain.split(" AND "))
 
 
-def texts(package: dict) -> list[str]:
+def texts(package: Crate) -> list[str]:
     """The licence files of a crate. Of several to choose from the MIT licence is enough; notices always stay."""
     begins = ("LICEN", "COPYING", "COPYRIGHT", "NOTICE", "UNLICENSE")
-    entries = sorted(Path(package["manifest_path"]).parent.iterdir())
+    entries = sorted(package.folder.iterdir())
     files = [file for file in entries if file.is_file() and file.name.upper().startswith(begins)]
     if any("MIT" in file.name for file in files):
         files = [file for file in files if not re.search("APACHE|UNLICENSE", file.name)]
     return [file.read_bytes().decode("utf-8", "replace").replace("\r\n", "\n").strip() for file in files]
 
 
-def standard_text(package: dict) -> str | None:
+def standard_text(package: Crate) -> str | None:
     """For a crate that ships no text: this repository's own copies of the two licences."""
-    if "MIT" in package["license"]:
-        authors = ", ".join(author.split(" <")[0] for author in package["authors"])
+    if "MIT" in package.licence:
+        authors = ", ".join(author.split(" <")[0] for author in package.authors)
         terms = (ROOT / "LICENSE-MIT").read_text(encoding="utf-8").partition("Permission is")[2].rstrip()
-        return f"MIT License\n\nCopyright (c) {authors or 'the authors of ' + package['name']}\n\nPermission is{terms}"
-    if "Apache-2.0" in package["license"]:
+        return f"MIT License\n\nCopyright (c) {authors or 'the authors of ' + package.name}\n\nPermission is{terms}"
+    if "Apache-2.0" in package.licence:
         return (ROOT / "LICENSE-APACHE").read_text(encoding="utf-8").strip()
     return None
 
@@ -72,9 +56,9 @@ def main() -> int:
     """A list of all crates, then each text once with the crates that it is for."""
     notice, faults = HEAD, []
     crates_of: dict[str, list[str]] = {}
-    packages = linked()
+    packages = [crate for crate in linked().values() if not crate.ours]
     for package in packages:
-        name, version, licence = (package[key] for key in ("name", "version", "license"))
+        name, version, licence = package.name, package.version, package.licence
         if not is_accepted(licence):
             faults.append(f"{name} {version}: the licence {licence} is not accepted (tests/style/licences.py)")
             continue

@@ -12,6 +12,7 @@ mod package;
 mod parts;
 mod process;
 mod rivals;
+mod sbom;
 mod stages;
 mod system;
 mod test;
@@ -67,6 +68,14 @@ enum Task {
         after_help = "Examples:\n  cargo xtask package\n  cargo xtask package --unity\n  cargo xtask package --wheel\n  cargo xtask package --platform windows-x64\n  cargo xtask package --platform web"
     )]
     Package(package::Options),
+    /// Write bills of materials (CycloneDX, SPDX) and checksums beside packages; `cargo xtask package` does it too.
+    #[command(
+        after_help = "Examples:\n  cargo xtask sbom\n  cargo xtask sbom target/package/libupt-0.1.0-linux-x64.tar.gz"
+    )]
+    Sbom {
+        /// Packages; default: all of target/package.
+        packages: Vec<std::path::PathBuf>,
+    },
     /// Write a static site that shows organs, for any host.
     #[command(after_help = "Example:\n  cargo xtask site --out site")]
     Site {
@@ -157,6 +166,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Bench(options) => bench::run(workspace, &options),
         Task::View { bundle } => upkeep::view(workspace, &bundle),
         Task::Package(options) => package::run(workspace, &options),
+        Task::Sbom { packages } => sbom::run(workspace, &packages),
         Task::Site { out } => web::site(workspace, &out),
         Task::Readme { reports, page } => upkeep::readme(workspace, &page, &reports),
         Task::Rivals { arguments } => rivals::run(workspace, &arguments),

@@ -1,4 +1,5 @@
-//! `cargo xtask package`: a relocatable archive for C and C++ hosts, the Unity package, the wheel, and the npm package (`web.rs`).
+//! `cargo xtask package`: a relocatable archive for C and C++ hosts, the Unity package, the wheel, and the npm package (`web.rs`). Beside each lie
+//! its bills of materials and checksums (`sbom.rs`).
 //!
 //! ```text
 //! libupt-VERSION-PLATFORM/
@@ -19,7 +20,7 @@ use crate::ort::{self, Platform};
 use crate::process::run_checked;
 use crate::system::has_program;
 use crate::workspace::{Workspace, copy, library};
-use crate::{archive, cross, venv, web, wheel};
+use crate::{archive, cross, sbom, venv, web, wheel};
 
 #[derive(Args)]
 pub struct Options {
@@ -57,8 +58,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     venv::create(workspace, "target/venv")?;
     let platform = match options.platform {
         Some(Wanted::Web) => {
-            println!("{}", web::package(workspace, &out)?.display());
-            return Ok(true);
+            return finish(workspace, web::package(workspace, &out)?);
         }
         Some(Wanted::Native(platform)) => platform,
         None => Platform::host()?,
@@ -68,7 +68,13 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         (_, true) => unity(workspace, &out)?,
         _ => native(workspace, platform, &out)?,
     };
+    finish(workspace, made)
+}
+
+/// What lies beside every package: what is in it, and its checksum.
+fn finish(workspace: &Workspace, made: PathBuf) -> Result<bool> {
     println!("{}", made.display());
+    sbom::write(workspace, &[made])?;
     Ok(true)
 }
 

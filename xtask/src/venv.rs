@@ -23,6 +23,13 @@ pub const DOCS: Set = (
     None,
 );
 
+/// What writes and checks bills of materials: the standards' own libraries.
+pub const SBOM: Set = (
+    "sbom",
+    "cyclonedx-python-lib[json-validation]==11.12.0 spdx-tools==0.8.5",
+    None,
+);
+
 /// The package `training/` with its test extra, editable.
 pub const TRAINING: Set = (
     "training",
