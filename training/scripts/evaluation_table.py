@@ -2,8 +2,9 @@
 
 python training/scripts/evaluation_table.py A.json ... [--page PAGE]
 
-`NAME=A.json` names the bundle. `--paper` leaves the plain methods out and puts the paper's own figures beside the
-bundle's: its 40 cases of schemes 1-4, its 10 of scheme 5, its 10 on the fine mesh.
+`NAME=A.json` names the bundle. `--add` keeps the page's rows of other cases, meshes and methods. `--paper` leaves the
+plain methods out and puts the paper's own figures beside the bundle's: its 40 cases of schemes 1-4, its 10 of scheme 5,
+its 10 on the fine mesh.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from upt_training.page import write_table  # noqa: E402
+from upt_training.page import rows_of, write_table  # noqa: E402
 
 NAMES = {
     "bundle": "",
@@ -65,6 +66,17 @@ def rows(named: str, only_bundle: bool = False, overall: bool = False) -> list[s
     return out
 
 
+def added(old: list[str], new: list[str]) -> list[str]:
+    """`new` and those of `old` that it has no row for: same scheme, mesh and method, whatever their number of cases."""
+
+    def key(row: str) -> tuple[str, str]:
+        cases, method = row.split("|")[1:3]
+        return cases.split(" (")[0].strip(), method.strip()
+
+    known = {key(row) for row in new}
+    return [row for row in old if key(row) not in known] + new
+
+
 def cell(scores: dict, name: str) -> str:
     """Mean and deviation; `-` where the score was left out (`--no-hausdorff`)."""
     return f"{scores[name]['mean']:.3f} ± {scores[name]['std']:.3f}" if name in scores else "-"
@@ -75,16 +87,19 @@ def main() -> None:
     parser.add_argument("results", nargs="+", help="JSON of `evaluate`, or NAME=JSON")
     parser.add_argument("--page", type=Path, help="page whose table to exchange")
     parser.add_argument("--marks", default="evaluation", help="of the table in the page (evaluation)")
+    parser.add_argument("--add", action="store_true", help="keep the page's rows of other cases, meshes and methods")
     parser.add_argument("--overall", action="store_true", help="leave out the single schemes of a file with several")
     parser.add_argument("--paper", action="store_true", help="the bundle alone, and the paper's figures below it")
     options = parser.parse_args()
+    table = [row for named in options.results for row in rows(named, options.paper, options.overall)]
+    table += paper_rows() if options.paper else []
+    if options.add and options.page:
+        table = added(rows_of(options.page, options.marks), table)
     lines = [
         "| cases (number) | method | MSE, mm² | range | Hausdorff, mm | max error, mm | relative L2 |",
         "|---|---|---|---|---|---|---|",
+        *table,
     ]
-    for named in options.results:
-        lines += rows(named, options.paper, options.overall)
-    lines += paper_rows() if options.paper else []
     if options.page:
         write_table(options.page, options.marks, lines)
     else:

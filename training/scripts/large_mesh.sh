@@ -1,13 +1,15 @@
 #!/bin/bash
-# Bundles of both kinds for the brain of about 151,201 nodes: large_mesh.sh WORK DATASET...
+# Bundles for the brain of about 151,201 nodes: large_mesh.sh WORK DATASET..., or WEIGHTS=BUNDLE large_mesh.sh WORK
 #
 # WORK gets brain-fine-reduced (kind `reduced`, corrected by what the cases at 21,708 nodes in DATASET... teach) and brain-fine
 # (kind `upt`, the weights of onnx/brain-fast). Run it in the repository's root; what WORK already holds is kept, so an
-# interrupted run goes on. UPT is the command `upt`, PYTHON a Python with upt_training. On two cores it takes about an hour;
-# 14 GB of disk, 9 GB of memory.
+# interrupted run goes on. Without a DATASET it gets the mesh and the weights of BUNDLE, which do without a linear response, as
+# brain-fine-NAME: minutes, and 3 GB of memory. UPT is the command `upt`, PYTHON a Python with upt_training. With a
+# DATASET it takes about an hour on two cores; 14 GB of disk, 9 GB of memory.
 set -euo pipefail
-if [ $# -lt 2 ]; then
+if [ $# -lt 1 ] || { [ $# -lt 2 ] && [ -z "${WEIGHTS:-}" ]; }; then
     echo "usage: $0 WORK DATASET...   (datasets of upt dataset on onnx/meshes/brain.mesh.safetensors)" >&2
+    echo "       WEIGHTS=BUNDLE $0 WORK   (weights that need no linear response)" >&2
     exit 2
 fi
 work=$1
@@ -35,6 +37,11 @@ for folder in "$@"; do
     data+=(--coarse-data "$folder")
 done
 make "$mesh" "$python" -m upt_training.anatomy --nodes 151201 --out "$mesh"
+if [ $# -eq 0 ]; then
+    fine=$work/brain-fine-$(basename "$WEIGHTS")
+    make "$fine/bundle.json" "$python" -m upt_training transfer "$WEIGHTS" --mesh "$mesh" --out "$fine"
+    exit
+fi
 make "$work/middle.columns.safetensors" "$upt" prior --mesh "$middle" --out "$work/middle.columns.safetensors"
 make "$columns" "$upt" prior --mesh "$mesh" --out "$columns"
 make "$work/fine.modes.safetensors" "$upt" modes --mesh "$mesh" --out "$work/fine.modes.safetensors"

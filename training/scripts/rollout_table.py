@@ -20,7 +20,7 @@ from corrections_table import replay  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 from upt_training.loads import WITHHELD  # noqa: E402
-from upt_training.page import write_table  # noqa: E402
+from upt_training.page import rows_of, write_table  # noqa: E402
 from upt_training.reduced.evaluate import group_of, released  # noqa: E402
 from upt_training.reduced.trajectories import Case, open_dataset  # noqa: E402
 
@@ -100,15 +100,9 @@ def main() -> None:
                 progress.update()
             lines.append(row(bundle.resolve().name, scheme, count, by_scheme[scheme], results))
     if options.page:
-        old = table_of(options.page, options.marks) if options.add else []
+        old = rows_of(options.page, options.marks) if options.add else []
         write_table(options.page, options.marks, [*lines[:2], *old, *lines[2:]])
     print("\n".join(lines))
-
-
-def table_of(page: Path, marks: str) -> list[str]:
-    """The rows that stand between the marks."""
-    text = page.read_text().split(f"<!-- {marks}: begin -->")[1].split(f"<!-- {marks}: end -->")[0]
-    return [line for line in text.strip().splitlines()[2:] if line.startswith("|")]
 
 
 if __name__ == "__main__":

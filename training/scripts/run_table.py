@@ -27,6 +27,7 @@ BARS = {
     "paper-replay": PLAIN,
     "paper-gpu": (0.2, 0.09),
     "paper-recipe-gpu": (0.2, 0.09),
+    "paper-fine": (0.2, 0.09),
     "plain-replay": PLAIN,
     "paper-prior": (0.013, 0.006),
     "paper-prior-fine": (0.025, 0.01),

@@ -63,3 +63,18 @@ def test_the_papers_figures_beside_a_named_bundle(tmp_path):
     assert "| schemes 1-2, K = 9 (3) | **large** | 2.000 ± 0.816 |" in text and "coarse FEM" not in text
     assert "scheme 1, K = 9" not in text
     assert "| scheme 5, K = 21679 (10) | *the paper* | 0.09 ± 0.04 | - | 1.99 ± 0.27 |" in text
+
+
+def test_rows_of_other_cases_stay_and_the_papers_come_last(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(PAGE)
+    first = [f"small={write(tmp_path / 'a.json', s1=[1.0])}", f"large={write(tmp_path / 'b.json', s5=[2.0])}"]
+    assert run(*first, "--paper", "--add", "--page", page).returncode == 0
+    again = f"small={write(tmp_path / 'c.json', s1=[3.0, 5.0])}"
+    assert run(again, "--paper", "--add", "--page", page).returncode == 0
+    rows = [line.split("|")[1:4] for line in page.read_text().splitlines() if line.startswith("| scheme")]
+    assert [[cell.strip() for cell in row] for row in rows[:2]] == [
+        ["scheme 5, K = 9 (1)", "**large**", "2.000 ± 0.000"],
+        ["scheme 1, K = 9 (2)", "**small**", "4.000 ± 1.000"],
+    ]
+    assert len(rows) == 5 and all("*the paper*" in row[1] for row in rows[2:])

@@ -15,6 +15,12 @@ def replaced(text: str, name: str, lines: list[str], page: Path) -> str:
     return text[: text.index(begin) + len(begin)] + "\n".join(lines) + "\n" + text[text.index(end) :]
 
 
+def rows_of(page: Path, name: str) -> list[str]:
+    """The rows of the table `name` that the page has, without its heading; none where there is no table yet."""
+    text = page.read_text().split(f"<!-- {name}: begin -->")[1].split(f"<!-- {name}: end -->")[0]
+    return [line for line in text.splitlines() if line.startswith("|")][2:]
+
+
 def write_table(page: Path, name: str, lines: list[str]) -> None:
     """Exchange the table `name` of the file `page`."""
     page.write_text(replaced(page.read_text(), name, lines, page))
