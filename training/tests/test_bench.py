@@ -101,17 +101,17 @@ def test_the_table_gives_the_spread_of_the_seeds():
 def test_the_table_of_runs_says_what_a_run_got(trained, tmp_path):
     page = tmp_path / "page.md"
     page.write_text("<!-- paper runs: begin -->\n<!-- paper runs: end -->\n")
-    script, other = CONFIGS.parent / "scripts/run_table.py", tmp_path / "other.json"
+    tables, other = CONFIGS.parent / "tables", tmp_path / "other.json"
     cases = [{"index": i, "bundle": {"mse_mm2": float(i)}} for i in (3, 1)]
     other.write_text(json.dumps({"bundle": "other", "cases": cases}))
-    command = [sys.executable, script, trained, "--evaluation", other, "--page", page]
+    command = [sys.executable, tables, "runs", trained, "--evaluation", other, "--page", page]
     subprocess.run(command, check=True, capture_output=True)
     cells = [cell.strip() for cell in page.read_text().splitlines()[3].strip("|").split("|")]
     assert cells[:5] == ["`tiny-replay`", "10,691", "1,400", "1,400", "22,400"] and float(cells[5]) >= 0
     assert cells[6].endswith("after step 1,400)") and cells[8:] == ["2.0000", "-", "-"]
     own = [{"index": i, "bundle": {"mse_mm2": 0.5, "max_mm": 3.0}} for i in (1, 3)]
     other.with_name("own.json").write_text(json.dumps({"bundle": "own", "cases": own}))
-    command[2] = f"{trained}={other.with_name('own.json')}"
+    command[3] = f"{trained}={other.with_name('own.json')}"
     subprocess.run(command, check=True, capture_output=True)
     cells = [cell.strip() for cell in page.read_text().splitlines()[3].strip("|").split("|")]
     assert cells[6:8] == ["0.5000 (2, after step 1,400)", "3.00"]

@@ -8,14 +8,14 @@ from conftest import CONFIGS
 
 from upt_training.box_mesh import box_mesh
 
-SCRIPT = Path(__file__).parents[1] / "scripts/data_memory.py"
+TABLES = Path(__file__).parents[1] / "tables"
 
 
 def gigabytes(mesh: Path, cases: int) -> tuple[float, float]:
     """Of the displacements, and of the largest resident set."""
-    run = subprocess.run(
-        [sys.executable, SCRIPT, "--config", CONFIGS / "tiny-replay.toml", "--mesh", mesh, "--cases", str(cases),
-         "--frames", "250", "--seconds", "0.5"], capture_output=True, text=True, check=True)  # fmt: skip
+    made = ["--config", CONFIGS / "tiny-replay.toml", "--mesh", mesh, "--cases", str(cases), "--frames", "250"]
+    command = [sys.executable, TABLES, "data_memory", *made, "--seconds", "0.5"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
     row = [cell.strip() for cell in run.stdout.splitlines()[-1].strip("|").split("|")]
     assert row[0] == "`tiny-replay`" and int(row[5]) > 0, run.stdout
     return float(row[3]), float(row[6])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from upt_training.metrics import summary
 
-SCRIPT = Path(__file__).parents[1] / "scripts/evaluation_table.py"
+TABLES = Path(__file__).parents[1] / "tables"
 PAGE = "before\n<!-- evaluation: begin -->\nold\n<!-- evaluation: end -->\nafter\n"
 
 
@@ -31,7 +31,7 @@ def write(path: Path, **cases: list[float]) -> Path:
 
 
 def run(*arguments) -> subprocess.CompletedProcess:
-    return subprocess.run([sys.executable, SCRIPT, *map(str, arguments)], capture_output=True, text=True)
+    return subprocess.run([sys.executable, TABLES, "evaluation", *map(str, arguments)], capture_output=True, text=True)
 
 
 def test_rows_of_schemes_and_all(tmp_path):

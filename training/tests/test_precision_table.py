@@ -10,7 +10,7 @@ from conftest import CONFIGS
 from upt_training.__main__ import main
 from upt_training.random_bundle import main as write_random
 
-SCRIPT = Path(__file__).parents[1] / "scripts/precision_table.py"
+SCRIPT = Path(__file__).parents[1] / "tables/precision.py"
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def script():
 def test_rows_are_rollouts_of_each_precision(script, data, mesh_path, tmp_path):
     bundle, page = tmp_path / "bundle", tmp_path / "page.md"
     write_random(["--config", str(CONFIGS / "tiny.toml"), "--mesh", str(mesh_path), "--out", str(bundle)])
-    rows = [[c.strip() for c in row.strip("|").split("|")] for row in script.table_rows(bundle, data, 1)]
+    rows = script.rows_of_bundle(bundle, data, 1)
     assert [row[1] for row in rows] == ["f32", "f16", "int8"]
     assert main(["evaluate", str(bundle), "--data", str(data), "--count", "1", "--out", str(page)]) == 0
     wanted = json.loads(page.read_text())["all"]["bundle"]

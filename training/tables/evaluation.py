@@ -1,23 +1,17 @@
-"""A Markdown table of results of `evaluate`, printed or written into a page:
+"""Results of `evaluate`: `python training/tables evaluation A.json ... [--overall] [--paper]`.
 
-python training/scripts/evaluation_table.py A.json ... [--page PAGE]
-
-`NAME=A.json` names the bundle. `--add` keeps the page's rows of other cases, meshes and methods. `--paper` leaves the
-plain methods out and puts the paper's own figures beside the bundle's: its 40 cases of schemes 1-4, its 10 of scheme 5,
-its 10 on the fine mesh.
+`NAME=A.json` names the bundle. `--paper` leaves the plain methods out and puts the paper's own figures beside the
+bundle's: its 40 cases of schemes 1-4, its 10 of scheme 5, its 10 on the fine mesh.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from upt_training.page import rows_of, write_table  # noqa: E402
-
+COLUMNS = ["cases (number)", "method", "MSE, mm²", "range", "Hausdorff, mm", "max error, mm", "relative L2"]
+MARKS, KEY = "evaluation", 2
 NAMES = {
     "bundle": "",
     "coarse_fem": "coarse FEM, embedded",
@@ -34,15 +28,15 @@ PAPER = {
 }
 
 
-def paper_rows() -> list[str]:
+def paper_rows() -> list[list[str]]:
     """What the paper reports; it has no relative error."""
     return [
-        f"| {group}, K = {nodes} ({count}) | *the paper* | {' | '.join(scores)} | - |"
+        [f"{group}, K = {nodes} ({count})", "*the paper*", *scores, "-"]
         for (group, nodes), (count, *scores) in PAPER.items()
     ]
 
 
-def rows(named: str, only_bundle: bool = False, overall: bool = False) -> list[str]:
+def rows_of_result(named: str, only_bundle: bool = False, overall: bool = False) -> list[list[str]]:
     name, _, path = named.rpartition("=")
     result = json.loads(Path(path).read_text())
     bundle = name or result["bundle"]
@@ -61,20 +55,9 @@ def rows(named: str, only_bundle: bool = False, overall: bool = False) -> list[s
             span = f"{scores['mse_mm2']['min']:.3f} to {scores['mse_mm2']['max']:.3f}"
             label = NAMES[method] or f"**{bundle}**"
             relative = f"{scores['relative_l2']['mean']:.3f}"
-            row = (f"{group}, K = {result['nodes']} ({count})", label, cells[0], span, cells[1], cells[2], relative)
-            out.append("| " + " | ".join(row) + " |")
+            cases = f"{group}, K = {result['nodes']} ({count})"
+            out.append([cases, label, cells[0], span, cells[1], cells[2], relative])
     return out
-
-
-def added(old: list[str], new: list[str]) -> list[str]:
-    """`new` and those of `old` that it has no row for: same scheme, mesh and method, whatever their number of cases."""
-
-    def key(row: str) -> tuple[str, str]:
-        cases, method = row.split("|")[1:3]
-        return cases.split(" (")[0].strip(), method.strip()
-
-    known = {key(row) for row in new}
-    return [row for row in old if key(row) not in known] + new
 
 
 def cell(scores: dict, name: str) -> str:
@@ -82,29 +65,12 @@ def cell(scores: dict, name: str) -> str:
     return f"{scores[name]['mean']:.3f} ± {scores[name]['std']:.3f}" if name in scores else "-"
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("results", nargs="+", help="JSON of `evaluate`, or NAME=JSON")
-    parser.add_argument("--page", type=Path, help="page whose table to exchange")
-    parser.add_argument("--marks", default="evaluation", help="of the table in the page (evaluation)")
-    parser.add_argument("--add", action="store_true", help="keep the page's rows of other cases, meshes and methods")
     parser.add_argument("--overall", action="store_true", help="leave out the single schemes of a file with several")
     parser.add_argument("--paper", action="store_true", help="the bundle alone, and the paper's figures below it")
-    options = parser.parse_args()
-    table = [row for named in options.results for row in rows(named, options.paper, options.overall)]
-    table += paper_rows() if options.paper else []
-    if options.add and options.page:
-        table = added(rows_of(options.page, options.marks), table)
-    lines = [
-        "| cases (number) | method | MSE, mm² | range | Hausdorff, mm | max error, mm | relative L2 |",
-        "|---|---|---|---|---|---|---|",
-        *table,
-    ]
-    if options.page:
-        write_table(options.page, options.marks, lines)
-    else:
-        print("\n".join(lines))
 
 
-if __name__ == "__main__":
-    main()
+def rows(options: argparse.Namespace) -> list[list[str]]:
+    found = [row for named in options.results for row in rows_of_result(named, options.paper, options.overall)]
+    return found + (paper_rows() if options.paper else [])

@@ -1,7 +1,7 @@
 """Whole rollouts through the library, by scheme and number of corrections, and the second after an abrupt release.
 
-    python training/scripts/rollout_table.py --upt target/release/upt --bundle onnx/brain-paper --data DIR \
-        --counts 0,3 --keep FOLDER --page PAGE --marks "brain-paper rollouts"
+    python training/tables rollouts --upt target/release/upt --bundle onnx/brain-paper --data DIR \
+        --counts 0,3 --keep FOLDER --page PAGE --marks "paper rollouts"
 
 Each case of the data is replayed through `upt rollout --json`; `--keep` holds these results, so an interrupted run
 goes on. The second after a release is the mean over cases of the MSE of the frames within a second after a push of
@@ -14,20 +14,26 @@ import sys
 from pathlib import Path
 from statistics import fmean, median
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 
 from corrections_table import replay  # noqa: E402
 from tqdm import tqdm  # noqa: E402
 
 from upt_training.loads import WITHHELD  # noqa: E402
-from upt_training.page import rows_of, write_table  # noqa: E402
 from upt_training.reduced.evaluate import group_of, released  # noqa: E402
 from upt_training.reduced.trajectories import Case, open_dataset  # noqa: E402
 
 GROUPS = {"schemes_1_4": "1 to 4", "scheme_5": "5", "tools": "tools"}
-HEAD = (
-    "| bundle | K | scheme (cases) | k | MSE, mm² (median) | max error, mm | the second after a release, mm² (cases) |"
-)
+COLUMNS = [
+    "bundle",
+    "K",
+    "scheme (cases)",
+    "k",
+    "MSE, mm² (median)",
+    "max error, mm",
+    "the second after a release, mm² (cases)",
+]
+MARKS, KEY = "paper rollouts", 4
 
 
 def kept(folder: Path | None, upt: str, bundle: Path, case: Case, count: str) -> dict:
@@ -44,7 +50,7 @@ def kept(folder: Path | None, upt: str, bundle: Path, case: Case, count: str) ->
     return json.loads(path.read_text())
 
 
-def row(name: str, scheme: str, count: str, cases: list[Case], results: list[dict]) -> str:
+def row(name: str, scheme: str, count: str, cases: list[Case], results: list[dict]) -> list[str]:
     errors, largest, after = [], [], []
     for case, result in zip(cases, results, strict=True):
         steps = [step["mse_mm2"] for step in result["steps"]]
@@ -55,14 +61,11 @@ def row(name: str, scheme: str, count: str, cases: list[Case], results: list[dic
             after.append(fmean(mse for mse, wanted in zip(steps, mask, strict=True) if wanted))
     nodes = cases[0].displacement.shape[1]
     second = f"{fmean(after):.4f} ({len(after)})" if after else ""
-    return (
-        f"| `{name}` | {nodes:,} | {scheme} ({len(cases)}) | {count} | {fmean(errors):.4f} ({median(errors):.4f}) "
-        f"| {fmean(largest):.2f} | {second} |"
-    )
+    score = f"{fmean(errors):.4f} ({median(errors):.4f})"
+    return [f"`{name}`", f"{nodes:,}", f"{scheme} ({len(cases)})", count, score, f"{fmean(largest):.2f}", second]
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--upt", default="target/release/upt")
     parser.add_argument("--bundle", action="append", required=True, type=Path)
     parser.add_argument("--data", action="append", required=True, type=Path)
@@ -70,12 +73,9 @@ def main() -> None:
     parser.add_argument("--groups", action="store_true", help="a row for schemes 1 to 4 and one for all tools")
     parser.add_argument("--counts", default="0,3", help="COUNT, or COUNT@MM")
     parser.add_argument("--keep", type=Path, help="folder of the rollouts' results")
-    parser.add_argument("--page", type=Path)
-    parser.add_argument("--marks", help="name of the table in the page")
-    parser.add_argument("--add", action="store_true", help="keep the rows that the page's table has")
-    options = parser.parse_args()
-    if (options.page is None) != (options.marks is None):
-        parser.error("--page and --marks go together")
+
+
+def rows(options: argparse.Namespace) -> list[list[str]]:
     by_scheme: dict[str, list[Case]] = {}
     for folder in options.data:
         mesh = json.loads((folder / "manifest.json").read_text())["mesh_sha256"]
@@ -84,13 +84,13 @@ def main() -> None:
                 continue
             name = GROUPS.get(group_of(case.scheme), case.scheme) if options.groups else case.scheme
             by_scheme.setdefault(name, []).append(case)
-    lines = [HEAD, "|---" * 7 + "|"]
     every = [
         (bundle, scheme, count)
         for scheme in sorted(by_scheme)
         for count in options.counts.split(",")
         for bundle in options.bundle
     ]
+    found = []
     total = sum(len(by_scheme[scheme]) for _, scheme, _ in every)
     with tqdm(total=total, unit="rollout", disable=None) as progress:
         for bundle, scheme, count in every:
@@ -98,12 +98,5 @@ def main() -> None:
             for case in by_scheme[scheme]:
                 results.append(kept(options.keep, options.upt, bundle, case, count))
                 progress.update()
-            lines.append(row(bundle.resolve().name, scheme, count, by_scheme[scheme], results))
-    if options.page:
-        old = rows_of(options.page, options.marks) if options.add else []
-        write_table(options.page, options.marks, [*lines[:2], *old, *lines[2:]])
-    print("\n".join(lines))
-
-
-if __name__ == "__main__":
-    main()
+            found.append(row(bundle.resolve().name, scheme, count, by_scheme[scheme], results))
+    return found

@@ -1,10 +1,10 @@
 """What training keeps in memory on a dataset much larger than that: the largest resident set of a `train` command.
 
-    python training/scripts/data_memory.py --config CONFIG.toml --mesh MESH [--prior PRIOR] [--vibration VIBRATION]
-        [--cases 200] [--frames 161] [--page PAGE]
+    python training/tables data_memory --config CONFIG.toml --mesh MESH [--prior PRIOR] [--vibration VIBRATION]
+        [--cases 200] [--frames 161]
 
 Makes a dataset of that size in a temporary folder out of sparse files (a moving contact, all other displacements are
-holes that read as zeros), runs the command on it for `--seconds`, and prints or writes a Markdown table. Mapped pages
+holes that read as zeros), runs the command on it for `--seconds`, and reads how large it became. Mapped pages
 of data count as resident, those of the temporary folder's cache too.
 """
 
@@ -20,15 +20,18 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+from upt_training.mesh_file import Mesh, load_mesh
 
-from upt_training.mesh_file import Mesh, load_mesh  # noqa: E402
-from upt_training.page import write_table  # noqa: E402
-
-HEAD = (
-    "| configuration | K | trajectories | displacements, GB | node subset on disk, GB | steps | "
-    "largest resident set, GB |"
-)
+COLUMNS = [
+    "configuration",
+    "K",
+    "trajectories",
+    "displacements, GB",
+    "node subset on disk, GB",
+    "steps",
+    "largest resident set, GB",
+]
+MARKS, KEY = "data memory", 2
 PATCH_MM, PUSH_MM = 8.0, 6.0
 
 
@@ -92,8 +95,7 @@ def largest_resident_set(command: list[str]) -> tuple[int, str]:
     return usage.ru_maxrss * 1024, text
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--config", type=Path, required=True)
     parser.add_argument("--mesh", type=Path, required=True)
     parser.add_argument("--prior", type=Path)
@@ -101,8 +103,9 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=200)
     parser.add_argument("--frames", type=int, default=161)
     parser.add_argument("--seconds", type=float, default=12.0, help="training time; reading the data is not counted")
-    parser.add_argument("--page", type=Path, help="page whose table `data memory` to exchange")
-    options = parser.parse_args()
+
+
+def rows(options: argparse.Namespace) -> list[list[str]]:
     mesh = load_mesh(options.mesh)
     with tempfile.TemporaryDirectory() as folder:
         data = Path(folder) / "data"
@@ -117,13 +120,4 @@ def main() -> None:
     print(text, file=sys.stderr)
     steps = text.rsplit("at step ", 1)[1].split(";")[0]
     cells = [f"`{options.config.stem}`", f"{mesh.node_count:,}", str(options.cases), f"{size / 1e9:.2f}"]
-    cells += [f"{subset / 1e9:.2f}", steps, f"{resident / 1e9:.2f}"]
-    lines = [HEAD, "|---" * len(cells) + "|", "| " + " | ".join(cells) + " |"]
-    if options.page:
-        write_table(options.page, "data memory", lines)
-    else:
-        print("\n".join(lines))
-
-
-if __name__ == "__main__":
-    main()
+    return [[*cells, f"{subset / 1e9:.2f}", steps, f"{resident / 1e9:.2f}"]]

@@ -1,4 +1,4 @@
-"""What training runs got and reached: `run_table.py RUN[=JSON] ... --evaluation JSON --page PAGE`.
+"""What training runs got and reached: `python training/tables runs RUN[=JSON] ... --evaluation JSON`.
 
 Reads the last scores in `log.csv` and the steps and CPU time in `last.pt` of each run folder; a run that has not been
 scored yet has no error in the table. `RUN=JSON` takes the scores that `evaluate` gave its bundle. `--evaluation` is
@@ -10,16 +10,12 @@ from __future__ import annotations
 
 import argparse
 import csv
-import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from upt_training.config import settings_from_dict  # noqa: E402
-from upt_training.model import Upt  # noqa: E402
-from upt_training.page import write_table  # noqa: E402
-from upt_training.scaling_report import Reference, read_reference  # noqa: E402
-from upt_training.trainer import load_checkpoint  # noqa: E402
+from upt_training.config import settings_from_dict
+from upt_training.model import Upt
+from upt_training.scaling_report import Reference, read_reference
+from upt_training.trainer import load_checkpoint
 
 PLAIN = (0.4, 0.09)
 BARS = {
@@ -32,10 +28,7 @@ BARS = {
     "paper-prior": (0.013, 0.006),
     "paper-prior-fine": (0.025, 0.01),
 }
-HEAD = (
-    "| configuration | parameters | steps done | of | samples | core-hours | held-out MSE, mm² (cases) | "
-    "max error, mm | {bundle}, same cases | bar | goal |"
-)
+MARKS, KEY = "paper runs", 1
 
 
 def verdict(mse: float | None, limit: float, cases: int, every: int) -> str:
@@ -45,7 +38,7 @@ def verdict(mse: float | None, limit: float, cases: int, every: int) -> str:
     return f"{limit} reached" if cases >= every else f"{limit} open: {cases} of {every} cases"
 
 
-def row(named: str, bundle: Reference) -> str:
+def row(named: str, bundle: Reference) -> list[str]:
     folder, _, scores = named.partition("=")
     run = Path(folder)
     checkpoint = load_checkpoint(run / "last.pt")
@@ -77,23 +70,30 @@ def row(named: str, bundle: Reference) -> str:
     cells.append(f"{bundle.mean(cases):.4f}")
     every = len(bundle.cases)
     cells += [verdict(mse, limit, cases, every) for limit in BARS.get(settings.name, ())]
-    return "| " + " | ".join(cells + ["-"] * (11 - len(cells))) + " |"
+    return cells + ["-"] * (11 - len(cells))
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("run", nargs="+", help="run folders, each with `=JSON` of `evaluate` of its bundle")
-    parser.add_argument("--page", type=Path, help="page to write into, between the marks")
-    parser.add_argument("--marks", default="paper runs", help="of the table in the page (paper runs)")
     parser.add_argument("--evaluation", type=Path, required=True, help="JSON of `evaluate` of a bundle")
-    options = parser.parse_args()
+
+
+def columns(options: argparse.Namespace) -> list[str]:
+    return [
+        "configuration",
+        "parameters",
+        "steps done",
+        "of",
+        "samples",
+        "core-hours",
+        "held-out MSE, mm² (cases)",
+        "max error, mm",
+        f"`{read_reference(options.evaluation).name}`, same cases",
+        "bar",
+        "goal",
+    ]
+
+
+def rows(options: argparse.Namespace) -> list[list[str]]:
     bundle = read_reference(options.evaluation)
-    head = HEAD.format(bundle=f"`{bundle.name}`")
-    lines = [head, "|---" * 11 + "|", *(row(run, bundle) for run in options.run)]
-    print("\n".join(lines))
-    if options.page:
-        write_table(options.page, options.marks, lines)
-
-
-if __name__ == "__main__":
-    main()
+    return [row(run, bundle) for run in options.run]

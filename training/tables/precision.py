@@ -1,6 +1,6 @@
-"""What half-precision and int8 graphs cost in accuracy, over whole rollouts: a Markdown table.
+"""What half-precision and int8 graphs cost in accuracy, over whole rollouts.
 
-    python training/scripts/precision_table.py BUNDLE=DATA ... [--count 8] [--page PAGE]
+    python training/tables precision BUNDLE=DATA ... [--count 8]
 
 A copy of each bundle gets the graphs (`variants`); float32, float16 and int8 then roll the same held-out cases from
 rest, each on its own states, in ONNX Runtime on the CPU. For the error of one step both networks get the inputs of the
@@ -16,19 +16,22 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
-from upt_training.bundle_rollout import BundleRunner  # noqa: E402
-from upt_training.dataset import open_dataset, open_trajectory  # noqa: E402
-from upt_training.metrics import RolloutMetrics, summary  # noqa: E402
-from upt_training.page import write_table  # noqa: E402
-from upt_training.variants import make_variants  # noqa: E402
+from upt_training.bundle_rollout import BundleRunner
+from upt_training.dataset import open_dataset, open_trajectory
+from upt_training.metrics import RolloutMetrics, summary
+from upt_training.variants import make_variants
 
 PRECISIONS = ("f32", "f16", "int8")
-HEAD = (
-    "| bundle (cases) | precision | MSE, mm² | max error, mm | one step, relative to float32 | "
-    "rollout, largest difference from float32, mm | latent and decoder, kB |"
-)
+COLUMNS = [
+    "bundle (cases)",
+    "precision",
+    "MSE, mm²",
+    "max error, mm",
+    "one step, relative to float32",
+    "rollout, largest difference from float32, mm",
+    "latent and decoder, kB",
+]
+MARKS, KEY = "precisions", 2
 
 
 class OneStep:
@@ -50,7 +53,7 @@ class OneStep:
         return (self.difference[precision] / self.size) ** 0.5
 
 
-def table_rows(bundle: Path, data: Path, count: int) -> list[str]:
+def rows_of_bundle(bundle: Path, data: Path, count: int) -> list[list[str]]:
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / bundle.name
         make_variants(bundle, copy, ["f16", "int8"])
@@ -74,15 +77,15 @@ def table_rows(bundle: Path, data: Path, count: int) -> list[str]:
             scores[p].append(metrics[p].scores())
         mse = ", ".join(f"{p} {scores[p][-1]['mse_mm2']:.4f}" for p in PRECISIONS)
         print(f"{bundle.name}, case {case.index}: {mse} mm²", file=sys.stderr, flush=True)
-    rows = []
+    found = []
     for p in PRECISIONS:
         s = summary(scores[p])
         cells = [f"`{bundle.name}` ({len(cases)})", p]
         cells += [f"{s['mse_mm2']['mean']:.4f} ± {s['mse_mm2']['std']:.4f}"]
         cells += [f"{s['max_mm']['mean']:.3f} ± {s['max_mm']['std']:.3f}"]
         cells += ["-", "-"] if p == "f32" else [f"{one_step.relative(p):.1e}", f"{apart[p]:.4f}"]
-        rows.append("| " + " | ".join([*cells, f"{sizes[p] / 1000:.0f}"]) + " |")
-    return rows
+        found.append([*cells, f"{sizes[p] / 1000:.0f}"])
+    return found
 
 
 def graph_bytes(folder: Path, precision: str) -> int:
@@ -91,21 +94,11 @@ def graph_bytes(folder: Path, precision: str) -> int:
     return sum((folder / f"{name}{suffix}.onnx").stat().st_size for name in ("latent", "decoder"))
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("pairs", nargs="+", metavar="BUNDLE=DATA", help="a bundle and the dataset of its test cases")
     parser.add_argument("--count", type=int, default=8, help="cases, at most")
-    parser.add_argument("--page", type=Path, help="page whose table `precisions` to exchange")
-    options = parser.parse_args()
-    lines = [HEAD, "|---" * HEAD.count(" | ") + "|---|"]
-    for pair in options.pairs:
-        bundle, data = pair.split("=", 1)
-        lines += table_rows(Path(bundle), Path(data), options.count)
-    if options.page:
-        write_table(options.page, "precisions", lines)
-    else:
-        print("\n".join(lines))
 
 
-if __name__ == "__main__":
-    main()
+def rows(options: argparse.Namespace) -> list[list[str]]:
+    pairs = [pair.split("=", 1) for pair in options.pairs]
+    return [row for bundle, data in pairs for row in rows_of_bundle(Path(bundle), Path(data), options.count)]
