@@ -1,4 +1,6 @@
 //! The envelope: whether a step's contact is inside what the model was trained on, as flags and a number.
+//!
+//! REQ-022: A contact outside of what the model was trained on raises its flag, and one inside does not.
 
 use crate::bundle::{Envelope, Mesh, ToolEnvelope};
 use crate::error::Result;

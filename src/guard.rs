@@ -1,5 +1,9 @@
 //! The guard: what a decoded state must satisfy before it is published. Finite, bounded, no growth without cause,
 //! and by option no inverted element.
+//!
+//! REQ-020: A state that is not finite or passes the bound is not published; the last good one stays.
+//!
+//! REQ-021: Inputs that are not numbers are refused, and nothing changes.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

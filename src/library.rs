@@ -1,4 +1,6 @@
 //! The process-wide part: options that hold for all models, and when they may change.
+//!
+//! REQ-016: After a fork the child's calls are refused, and the parent goes on.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -1,5 +1,7 @@
 //! Room whose size a host or a bundle decides: asked for, so that there being none is an error and not the end of the
 //! process.
+//!
+//! REQ-014: Where memory is missing for what a host or a bundle decides the size of, the call returns a status and nothing has changed.
 
 mod held;
 

@@ -71,6 +71,7 @@ fn push(model: &Model, seed: u64) -> (Vec<u32>, [f32; 3]) {
     (near.collect(), inward)
 }
 
+/// Verifies REQ-034.
 #[test]
 fn shipped_bundles_fall_asleep_after_random_pushes() {
     fixture::find_runtime();

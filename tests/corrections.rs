@@ -31,6 +31,7 @@ fn worst(corrections: Corrections) -> (f32, f32) {
     (residual, error)
 }
 
+/// Verifies REQ-037.
 #[test]
 fn more_corrections_leave_less_residual_and_a_smaller_estimate() {
     let few = worst(Corrections::Fixed(2));
@@ -148,6 +149,7 @@ fn what_cannot_be_is_refused() {
     assert!(upt::Scene::new(corrected, &limit).is_err());
 }
 
+/// Verifies REQ-037.
 #[test]
 fn the_limit_of_the_error_raises_a_flag() {
     let model = model("tiny-corrected");

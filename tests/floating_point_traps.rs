@@ -31,6 +31,7 @@ fn trapped(name: &str, call: impl FnOnce() -> i32) -> i32 {
     status
 }
 
+/// Verifies REQ-015.
 #[test]
 fn every_call_of_a_host_that_traps_exceptions_returns() {
     for bundle in fixture::BUNDLES {

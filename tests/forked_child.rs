@@ -13,6 +13,7 @@ use std::ptr::null_mut;
 use host::Host;
 use upt::ffi::*;
 
+/// Verifies REQ-016.
 #[test]
 fn calls_of_a_forked_child_are_refused_and_the_parent_goes_on() {
     let host = Host::new("tiny-upt", |options| options.threads = 2);

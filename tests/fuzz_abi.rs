@@ -9,6 +9,7 @@ mod fixture;
 
 use proptest::collection::vec;
 
+/// Verifies REQ-010.
 #[test]
 fn any_sequence_of_calls_is_answered_as_documented() {
     fixture::find_runtime();

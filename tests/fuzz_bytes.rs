@@ -112,6 +112,7 @@ fn a_damaged_file_of_a_bundle_is_refused_or_gives_the_same_steps() {
     });
 }
 
+/// Verifies REQ-005.
 #[test]
 fn damage_that_the_hash_does_not_show_is_an_error_or_a_model_that_steps() {
     find_runtime();
@@ -158,6 +159,7 @@ fn steps_or_error(model: &Arc<Model>) -> upt::Result<()> {
     Ok(())
 }
 
+/// Verifies REQ-032.
 #[test]
 fn a_damaged_snapshot_is_refused_or_restores_what_it_holds() {
     let subjects: Vec<(Scene, Vec<u8>)> = BUNDLES

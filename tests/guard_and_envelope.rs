@@ -29,6 +29,7 @@ fn bounded(name: &str, bound_mm: f32) -> (tempfile::TempDir, std::sync::Arc<Mode
     (folder, model)
 }
 
+/// Verifies REQ-020.
 #[test]
 fn hold_keeps_the_last_good_state() {
     for name in BUNDLES {
@@ -129,6 +130,7 @@ fn a_refused_step_without_contact_is_replaced_under_every_policy() {
     }
 }
 
+/// Verifies REQ-021.
 #[test]
 fn inputs_that_are_not_numbers_are_refused_and_nothing_changes() {
     for name in BUNDLES {
@@ -200,6 +202,7 @@ fn inputs_that_are_not_numbers_are_refused_and_nothing_changes() {
     }
 }
 
+/// Verifies REQ-022.
 #[test]
 fn envelope_flags_are_set_when_and_only_when_outside() {
     for name in BUNDLES {
@@ -300,6 +303,7 @@ fn held_nodes_stay_and_contact_nodes_end_at_c() {
     }
 }
 
+/// Verifies REQ-023.
 #[test]
 fn an_inverted_element_is_refused_where_asked() {
     let model = model("tiny-upt");
@@ -320,6 +324,7 @@ fn an_inverted_element_is_refused_where_asked() {
     assert_ne!(scene.stats().flags & flag::INVERTED, 0);
 }
 
+/// Verifies REQ-023.
 #[test]
 fn an_element_inside_out_at_the_contact_is_told_of_without_being_asked() {
     let model = model("tiny-reduced");

@@ -213,6 +213,7 @@ fn out_of_contact_there_is_no_force() {
     });
 }
 
+/// Verifies REQ-050.
 #[test]
 fn a_hand_gets_no_energy() {
     let scene = scene(&model("tiny-corrected"), &corrected());
@@ -235,6 +236,7 @@ fn a_hand_gets_no_energy() {
     assert!(most < 1e-6, "{most} J");
 }
 
+/// Verifies REQ-051.
 #[test]
 fn the_age_of_the_last_step_is_told() {
     let scene = scene(&model("tiny-corrected"), &corrected());
@@ -269,6 +271,7 @@ fn a_reset_scene_pushes_no_more() {
     assert!(force.contact, "{force:?}");
 }
 
+/// Verifies REQ-050.
 #[test]
 fn a_limit_bounds_the_force() {
     let scene = scene(&model("tiny-corrected"), &corrected());
@@ -338,6 +341,7 @@ fn pose_at(pose: &HapticPose, time_s: f64) -> HapticPose {
 
 /// A torn read would mix two steps: every field of a published problem is of one of them, so the force is that of one of two
 /// depths, or between.
+/// Verifies REQ-051.
 #[test]
 fn a_hand_and_the_steps_run_on_two_threads() {
     let one = scene(&model("tiny-corrected"), &corrected());

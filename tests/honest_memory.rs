@@ -64,6 +64,7 @@ fn brain(name: &str) -> PathBuf {
 }
 
 /// One test: another one's allocations would be counted.
+/// Verifies REQ-035.
 #[test]
 fn memory_is_stated_to_ten_percent_and_given_back() {
     fixture::find_runtime();

@@ -39,6 +39,7 @@ fn warnings() -> Vec<String> {
     warnings.map(|(_, text)| text).collect()
 }
 
+/// Verifies REQ-018.
 #[test]
 fn a_flag_is_told_when_it_rises_and_the_receiver_cannot_call_the_library() {
     assert_eq!(

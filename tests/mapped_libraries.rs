@@ -27,6 +27,7 @@ fn of_runtime(names: &BTreeSet<String>) -> Vec<&String> {
 }
 
 /// One test: a library that was mapped stays.
+/// Verifies REQ-019.
 #[test]
 fn a_process_maps_only_what_its_models_need() {
     let at_start = mapped();

@@ -221,6 +221,7 @@ fn haptics_allocate_nothing() {
 }
 
 /// One test, so that no other test's allocations are counted.
+/// Verifies REQ-033.
 #[test]
 fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
     if Isa::detect() == Isa::Scalar {

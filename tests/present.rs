@@ -117,6 +117,7 @@ fn frames_run_on_when_a_step_arrives() {
     );
 }
 
+/// Verifies REQ-052.
 #[test]
 fn the_arrival_of_a_step_moves_nothing_at_its_moment() {
     let scene = scene(&model("tiny-corrected"), &corrected());

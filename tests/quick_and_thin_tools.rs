@@ -89,6 +89,7 @@ fn jab(scene: &Scene, place: &Place, shape: &Shape, end: f32, way: f32, depth: f
     deepest
 }
 
+/// Verifies REQ-040.
 #[test]
 fn quick_and_leaping_balls_do_not_pass_through() {
     let model = model();
@@ -137,6 +138,7 @@ fn cone() -> Shape {
     }
 }
 
+/// Verifies REQ-040.
 #[test]
 fn needles_points_and_square_probes_are_stopped_between_the_samples() {
     let model = model();
@@ -244,6 +246,7 @@ fn a_grasp_does_not_survive_a_leap() {
     assert!(scene.stats().max_displacement_mm < 5.0);
 }
 
+/// Verifies REQ-046.
 #[test]
 fn a_step_of_deep_tools_is_bounded_and_says_what_it_left() {
     let model = model();

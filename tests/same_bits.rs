@@ -5,6 +5,7 @@ mod fixture;
 use fixture::{BUNDLES, bits, largest_difference, model, plain, push, rollout, scene, sparse};
 use upt::{Contact, DecoderKernel, IndexSet, SceneOptions, StepInput};
 
+/// Verifies REQ-030.
 #[test]
 fn one_two_and_four_threads_agree() {
     for name in BUNDLES {

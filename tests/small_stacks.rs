@@ -28,6 +28,7 @@ struct Shared(Host);
 // SAFETY: handles are numbers.
 unsafe impl Send for Shared {}
 
+/// Verifies REQ-017.
 #[test]
 fn calls_stay_within_the_stated_stack() {
     let brain = concat!(env!("CARGO_MANIFEST_DIR"), "/onnx/brain-coarse");

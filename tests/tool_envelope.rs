@@ -81,6 +81,7 @@ fn a_tool_inside_of_the_limits_raises_nothing() {
     assert!(indicator > 0.1 && indicator <= 1.0, "{indicator}");
 }
 
+/// Verifies REQ-022.
 #[test]
 fn each_limit_has_its_flag() {
     for (name, expected, got) in [

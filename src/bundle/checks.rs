@@ -1,4 +1,6 @@
 //! What the values of a manifest must satisfy; every failure names the field.
+//!
+//! REQ-005: Damage that no hash shows gives a typed error or a model whose published states are finite.
 
 use super::faults::{bad, check};
 use super::manifest::{Envelope, Manifest, ManifestKind, ReducedEntry, ToolEnvelope, UptEntry};

@@ -1,5 +1,7 @@
 //! What this library knows of a manifest. A bundle that asks for more is refused, instead of running other dynamics than
 //! it was made with (`docs/reference/formats.md`, "Versions").
+//!
+//! REQ-004: A bundle that needs a newer library is refused and says so.
 
 use serde_json::Value;
 

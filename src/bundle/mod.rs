@@ -1,4 +1,6 @@
 //! Bundles: bytes on disk -> checked values. The format is `docs/reference/formats.md`.
+//!
+//! REQ-001: A bundle with a missing, short or altered file is refused with an error that names the file or the field.
 
 mod checks;
 mod cut_mesh;

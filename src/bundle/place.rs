@@ -1,4 +1,6 @@
 //! Where a bundle's files lie: in a folder, or in memory, for hosts that have no files or keep theirs in archives.
+//!
+//! REQ-003: Only regular files in the bundle's own folder are read.
 
 use std::collections::BTreeMap;
 use std::fs;

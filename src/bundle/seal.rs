@@ -1,4 +1,6 @@
 //! The manifest's own digest: `manifest_sha256` is the SHA-256 of `bundle.json` with these 64 digits written as zeros.
+//!
+//! REQ-002: Any altered byte of a sealed manifest is found when the bundle is opened.
 
 use serde_json::Value;
 use sha2::{Digest, Sha256};

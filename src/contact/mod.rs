@@ -14,6 +14,8 @@
 //! | [`problem`] | the samples near the tools, one solve for the forces on them, what the forces change, and what tools are told |
 //!
 //! Shapes, samples and sweeps are those of the reference solver (crate `contact`). Lengths mm, forces mN.
+//!
+//! REQ-041: A pressed tool leaves no penetration, feels a force back, and none once it is lifted.
 
 mod buried;
 pub mod compliance;

@@ -1,4 +1,6 @@
 //! What contact remembers from step to step: where the tools were, with which force each sample was pushed, what is grasped.
+//!
+//! REQ-044: A tool that starts inside the tissue is told of and comes out on its own side.
 
 use ::contact::grasp::Anchor;
 use ::contact::{End, Grasp, Pose, Samples, Vector};

@@ -1,4 +1,6 @@
 //! A scene's corrections: its velocities, its L-BFGS memory, and the iterations of a step.
+//!
+//! REQ-082: Corrected steps follow the reference solver, and more corrections follow it closer.
 
 use crate::clock::Instant;
 

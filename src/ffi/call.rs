@@ -1,4 +1,6 @@
 //! The frame of every exported function: panics stop here, failures become a status and the thread's message.
+//!
+//! REQ-012: A panic inside the library becomes a status; the scene refuses further calls, and others go on.
 
 use std::any::Any;
 use std::cell::RefCell;

@@ -1,4 +1,6 @@
 //! The host's `upt_input` -> the library's input of a step; `upt_view` -> what is shown.
+//!
+//! REQ-011: A mistake in the input of a step is a typed error that names the field, and nothing changes.
 
 use super::constants::*;
 use super::convert;

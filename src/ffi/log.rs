@@ -3,6 +3,8 @@
 //! The callback runs on the host's threads only, inside of its calls. A managed host (Mono in Unity) takes each native
 //! thread that calls into it for one of its own, and its domain reload then waits for that thread for ever. So what
 //! the library's and ONNX Runtime's threads say waits in a queue for the next call of the host.
+//!
+//! REQ-018: A flag that rises is told once to the host's log receiver, which cannot call the library.
 
 use crate::clock::Instant;
 use std::cell::Cell;

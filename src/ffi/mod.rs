@@ -2,6 +2,8 @@
 //!
 //! A function checks its pointers, finds its handle, calls one safe function and turns the result into a status;
 //! there is no other logic here. Conventions: `docs/reference/abi.md`; why it is built this way: `docs/decisions/001-ffi.md`.
+//!
+//! REQ-010: A call returns a status that its documentation names. One that fails writes no output and changes no state.
 
 #![allow(non_camel_case_types, clippy::missing_safety_doc)]
 

@@ -1,5 +1,7 @@
 //! Live handles. A handle is a number that is never used twice, not an address: a closed, foreign or invented
 //! handle is found out by a look-up and is never followed.
+//!
+//! REQ-013: A handle that is closed, of another kind or invented is refused at any later time.
 
 use std::cell::OnceCell;
 use std::collections::HashMap;

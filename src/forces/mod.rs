@@ -3,6 +3,8 @@
 //! The tissue pushes an instrument that holds node `a` with `-sum f_a` over the elements around it, `f_a` the derivative of
 //! their strain energy ([`elements::stress`]); inertia and damping of the node itself are left out. Forces are mN, lengths mm,
 //! moduli Pa (1 Pa mm² = 1e-3 mN); all arithmetic in f64.
+//!
+//! REQ-043: The force of contact is the reference solver's reaction for the same state.
 
 #[cfg(test)]
 mod tests;

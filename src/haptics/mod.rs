@@ -15,6 +15,10 @@
 //! | `passivity` | no more energy to the hand than came from it |
 //!
 //! At this boundary metres, newtons and newton metres; inside millimetres and millinewtons.
+//!
+//! REQ-050: The force of a hand brings no energy into it, and a limit bounds it.
+//!
+//! REQ-051: A hand and the steps run on two threads; the age of the last step is told.
 
 mod ends;
 mod modes;

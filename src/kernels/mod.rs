@@ -4,6 +4,8 @@
 //! [`lanes`], compiled for AVX2, AVX-512 and NEON and chosen at run time by [`Isa`]. Threads come
 //! from a [`Pool`]. All results have the same bits for any thread count, and any subset of rows
 //! gives the bits that the whole set gives (on one `Isa`; different sets differ in rounding).
+//!
+//! REQ-030: On one machine a step has the same bits for any number of threads.
 
 // Register tiles are small arrays walked by index, several of them at once.
 #![allow(clippy::needless_range_loop)]

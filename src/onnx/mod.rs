@@ -3,6 +3,8 @@
 //! `linked` is the only place that knows the crate `ort`. A build without the feature `learned` has `left_out` in its place, with the
 //! same names: there no runtime and no stage is ever made. Nothing here is touched, and no library is opened, until a model
 //! that has a graph is opened or the providers are asked for.
+//!
+//! REQ-019: A process opens only the libraries that its models need: without networks no ONNX Runtime.
 
 mod choice;
 #[cfg(not(feature = "learned"))]

@@ -1,4 +1,6 @@
 //! The step itself: check, predict, decode, boundary conditions, guard, publish (design: the paper's Eq. 2).
+//!
+//! REQ-033: Steps allocate nothing in steady state.
 
 use crate::clock::Instant;
 use std::sync::{Arc, PoisonError, RwLock};

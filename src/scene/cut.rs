@@ -3,6 +3,8 @@
 //! The cut body is a model like any other ([`crate::model::Model`]): its mesh has the copies of nodes, its tables their parents' rows, its near set
 //! the cut. A new core of it is made beside the old one; only when it is whole, with the state moved over, do they change places. Copies take
 //! displacement and velocity of the node that they come from, so that nothing moves at the moment of a cut.
+//!
+//! REQ-060: Nothing moves at the moment of a cut, and a cut that is refused changes nothing.
 
 use std::sync::{Arc, PoisonError, RwLock};
 

@@ -1,6 +1,8 @@
 //! A bundle without a learned map swings freely after a release, from the last corrected state: `z = N^T M u` and
 //! `dz/dt = N^T M v` in the natural modes `N` (`docs/reference/formats.md`, "`vibration.safetensors`"). What they leave out goes to the file's
 //! learned map, where it has one.
+//!
+//! REQ-034: Tissue that nothing touches comes to rest.
 
 use super::reduced::ReducedEngine;
 use crate::error::Result;

@@ -1,4 +1,6 @@
 //! A cheap look at the elements around the contact: whether a push has turned one inside out.
+//!
+//! REQ-023: An inverted element is told of, and where asked its state is refused.
 
 use crate::bundle::{Mesh, volume};
 use crate::error::Result;

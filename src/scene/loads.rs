@@ -1,4 +1,6 @@
 //! What acts on the body beside contact: gravity that turns, forces on nodes, pressure on the surface. A scene without loads keeps nothing of them.
+//!
+//! REQ-070: A bad load is named and changes nothing; forces that are the weight act as gravity does.
 
 use serde::{Deserialize, Serialize};
 

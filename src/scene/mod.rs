@@ -1,6 +1,8 @@
 //! [`Scene`]: a tissue that is stepped. One thread at a time; a call while another thread steps it is
 //! [`Error::Busy`]. Reading the published states (`read`, `sample`, their points, `stats`) is allowed from any thread
 //! at any time, also while a submitted step is in flight, and never waits for a step.
+//!
+//! REQ-017: A call stays within the stack that the C ABI's page states.
 
 mod bed;
 mod build;

@@ -1,4 +1,6 @@
 //! The tissue at the present moment: between steps, and while one is in flight, with the instruments where they are now.
+//!
+//! REQ-052: The arrival of a step moves no frame at its moment.
 
 use std::sync::RwLock;
 

@@ -2,6 +2,10 @@
 //!
 //! A magic and a version, little-endian; then in postcard's format the scene's origin and its [`State`]; at the end the SHA-256 of all
 //! before it (`docs/decisions/013-state.md`).
+//!
+//! REQ-031: A restored snapshot goes on to the bit, with contact, friction and grasps.
+//!
+//! REQ-032: A damaged snapshot is refused and changes nothing.
 
 use std::sync::{PoisonError, RwLock};
 

@@ -3,6 +3,8 @@
 //! With the support's pose `A = [R c]` (mesh to world) at three ends of steps, BDF2 gives the frame's velocity and acceleration as the same kind
 //! of matrix, `V` and `W`. At a node `X`, in the frame, the body then bears `-m R^T (W X + 2 V v)`: translation, Euler's, centrifugal and
 //! Coriolis' forces together. Displacements, tools and forces stay in the frame, in which a large motion of the support is none of the body.
+//!
+//! REQ-071: A support that moves as one rigid body carries the tissue without strain.
 
 use ::contact::{Pose, pose};
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,6 @@
 //! Ties of a step: checked, and their far ends put into the mesh's frame.
+//!
+//! REQ-072: A tie pulls as its spring does, and once broken stays so.
 
 use ::contact::{End, Tie, Vector};
 

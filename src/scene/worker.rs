@@ -2,6 +2,8 @@
 //!
 //! One step runs at a time and one more input may wait. The thread is started by the first submit and sleeps between
 //! steps.
+//!
+//! REQ-036: A submitted step gives what the host's own would, its error is told once, and concurrent use returns at once.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;

@@ -36,6 +36,7 @@ fn with_file(name: &str, file: &str, change: impl Fn(&mut Vec<u8>)) -> Result<()
     open(folder.path())
 }
 
+/// Verifies REQ-001.
 #[test]
 fn missing_short_and_altered_files_are_named() {
     find_runtime();
@@ -143,6 +144,7 @@ fn graphs_and_tensors_that_do_not_fit_are_refused() {
     );
 }
 
+/// Verifies REQ-004.
 #[test]
 fn what_a_bundle_needs_of_a_newer_library_is_refused() {
     type Change = fn(&mut serde_json::Value);
@@ -170,6 +172,7 @@ fn what_a_bundle_needs_of_a_newer_library_is_refused() {
 }
 
 /// Bit by bit, every byte of a manifest: none is taken for the one that was exported.
+/// Verifies REQ-002.
 #[test]
 fn every_flip_of_a_manifest_is_refused() {
     find_runtime();
@@ -208,6 +211,7 @@ fn a_manifest_without_a_digest_is_taken() {
     open(folder.path()).unwrap();
 }
 
+/// Verifies REQ-003.
 #[cfg(unix)]
 #[test]
 fn only_regular_files_are_opened() {

@@ -3,6 +3,7 @@
 use super::fixture::{copy_of, find_runtime};
 use super::{open, with_manifest};
 
+/// Verifies REQ-001.
 #[test]
 fn manifest_errors_name_the_field() {
     let set = |pointer: &'static str, value: serde_json::Value| {

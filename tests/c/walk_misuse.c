@@ -22,6 +22,7 @@ static void *library_function(const char *name) {
 #endif
 }
 
+/* Verifies REQ-013. */
 void walk_handles(void) {
   upt_scene *scene = make_scene();
   upt_scene_stats stats;
@@ -62,6 +63,7 @@ void walk_threads(void) {
   EXPECT(upt_scene_destroy(scene), UPT_OK);
 }
 
+/* Verifies REQ-012. */
 int walk_panic(void) {
   upt_scene *scene, *sane;
   upt_scene_stats stats;

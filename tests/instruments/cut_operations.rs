@@ -78,6 +78,7 @@ fn operate(scene: &Scene, draw: &mut Draw, at: Vector, normal: Vector) -> Result
     Ok(scene.node_count().saturating_sub(before))
 }
 
+/// Verifies REQ-061.
 #[test]
 fn random_operations_leave_every_state_finite_and_none_is_lost() {
     let number =

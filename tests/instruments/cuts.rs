@@ -41,6 +41,7 @@ pub(crate) fn slit(scene: &Scene, aside: f32, depth: f32) -> [[f32; 3]; 4] {
     ]
 }
 
+/// Verifies REQ-060.
 #[test]
 fn nothing_moves_at_the_moment_of_a_cut() {
     let (scene, tool) = pressed();
@@ -102,6 +103,7 @@ fn snapshots_go_across_cuts_and_reset_gives_the_intact_body() {
     assert_eq!(bits(&step(&other, tools)), bits(&step(&fresh, tools)));
 }
 
+/// Verifies REQ-060.
 #[test]
 fn what_cannot_be_cut_stays_as_it_is() {
     let (scene, tool) = pressed();

@@ -7,6 +7,7 @@ use upt::{Contact, Error, SceneOptions, flag};
 use super::fixture::{model, plain, scene};
 use super::{ball, pressing, readings, site, step, with};
 
+/// Verifies REQ-044.
 #[test]
 fn a_tool_that_starts_deep_inside_is_told_of_and_comes_out_on_its_own_side() {
     let scene = scene(&model("tiny-corrected"), &with(5));

@@ -75,6 +75,7 @@ fn size(v: [f32; 3]) -> f32 {
     Vector::from(v).length()
 }
 
+/// Verifies REQ-041.
 #[test]
 fn a_press_leaves_no_penetration_and_pushes_back_and_a_lift_ends_it() {
     for corrections in [0, 1, 3, 10] {
@@ -148,6 +149,7 @@ fn a_reset_scene_forgets_what_its_tools_read() {
     );
 }
 
+/// Verifies REQ-042.
 #[test]
 fn friction_obeys_coulomb_and_drags() {
     let model = model("tiny-corrected");
@@ -180,6 +182,7 @@ fn friction_obeys_coulomb_and_drags() {
     assert!(rough < smooth - 0.2 * smooth.abs(), "{smooth} {rough}");
 }
 
+/// Verifies REQ-045.
 #[test]
 fn a_grasp_pulls_and_tears_off() {
     let scene = scene(&model("tiny-corrected"), &with(5));
@@ -233,6 +236,7 @@ fn programme(scene: &Scene, steps: std::ops::Range<i32>) -> Vec<u32> {
     all
 }
 
+/// Verifies REQ-030.
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let model = model("tiny-corrected");
@@ -248,6 +252,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     }
 }
 
+/// Verifies REQ-031.
 #[test]
 fn a_snapshot_resumes_contact_friction_and_grasp_to_the_bit() {
     let model = model("tiny-corrected");

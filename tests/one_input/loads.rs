@@ -124,6 +124,7 @@ fn a_body_under_a_load_is_awake_and_comes_to_rest_after_it() {
 }
 
 /// Forces on the nodes hold the body where gravity would let it: the same field, by another way.
+/// Verifies REQ-070.
 #[test]
 fn forces_that_are_the_weight_are_gravity() {
     let model = model(BUNDLE);
@@ -253,6 +254,7 @@ fn a_snapshot_under_loads_resumes_to_the_bit() {
     );
 }
 
+/// Verifies REQ-070.
 #[test]
 fn bad_loads_are_named_and_change_nothing() {
     let model = model(BUNDLE);

@@ -14,6 +14,7 @@ use crate::{BUNDLE, awake, ball, frame, state, step};
 /// What is wrong with an input, how it is made wrong, the status, and the field that the message names.
 type Mistake = (&'static str, fn(&mut upt_input), i32, &'static str);
 
+/// Verifies REQ-011.
 #[test]
 fn mistakes_are_named_and_change_nothing() {
     static NODES: [u32; 2] = [1, 1];

@@ -37,6 +37,7 @@ fn carried(t: u32) -> StepInput<'static> {
 }
 
 /// After a way of 23 mm and four radians the body is in its frame as it was, and what it bore on the way was inertia.
+/// Verifies REQ-071.
 #[test]
 fn a_support_carries_the_body_without_strain() {
     let scene = scene(&model(BUNDLE), &plain());

@@ -73,6 +73,7 @@ pub fn hang(scene: &Scene, ties: &[Tie], steps: u32) -> (Vec<f32>, Vec<TieReadin
 }
 
 /// Soft, stiff and 1e4 N/m: the force is the spring's at the tie's length, and the tissue lies where the same force on the node takes it.
+/// Verifies REQ-072.
 #[test]
 fn a_tie_pulls_as_its_spring_and_the_tissue_as_under_that_force() {
     for stiffness in [0.5f32, 20.0, 1e4] {
@@ -263,6 +264,7 @@ fn ties_give_the_same_bits_however_they_are_given() {
 }
 
 /// A tie breaks at its force; it stays broken, also in a snapshot, heals where it has no stiffness for a step, and with the scene.
+/// Verifies REQ-072.
 #[test]
 fn a_broken_tie_stays_broken_until_it_is_taken_off() {
     let [own, other] = [0; 2].map(|_| scene(&model(BUNDLE), &thorough()));

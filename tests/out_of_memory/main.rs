@@ -105,6 +105,7 @@ fn options(change: impl FnOnce(&mut upt_scene_options)) -> upt_scene_options {
 }
 
 /// One test: the allocator is the process's.
+/// Verifies REQ-014.
 #[test]
 fn no_memory_is_a_status_wherever_it_is_missing() {
     fixture::find_runtime();

@@ -64,6 +64,14 @@ no_build_paths() {
   ! grep -rlF "$root" "$prefix/lib/cmake" "$prefix/lib/pkgconfig" "$prefix/share/doc"
 }
 check no_build_paths no_build_paths
+# What two builds in two folders differ in: local symbols and the number of the build.
+stripped() {
+  local file
+  for file in lib/libupt.so bin/upt; do
+    ! readelf --sections --wide "$prefix/$file" | grep -E 'symtab|build-id' || return 1
+  done
+}
+check stripped stripped
 check documents "${UPT_PYTHON:-$root/target/venv/bin/python}" "$root/tests/docs/links.py" "$prefix/share/doc/upt"
 
 bundle="$(find "$prefix/share/upt/bundles" -mindepth 1 -maxdepth 1 -type d 2>/dev/null | sort | head -n 1)"

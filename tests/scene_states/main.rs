@@ -88,6 +88,7 @@ fn sampling_passes_through_both_states() {
     }
 }
 
+/// Verifies REQ-031.
 #[test]
 fn a_snapshot_resumes_to_the_bit() {
     for name in BUNDLES {
@@ -118,6 +119,7 @@ fn a_snapshot_resumes_to_the_bit() {
     }
 }
 
+/// Verifies REQ-032.
 #[test]
 fn a_bad_snapshot_is_refused_and_changes_nothing() {
     let (reduced, upt) = (model("tiny-reduced"), model("tiny-upt"));

@@ -10,6 +10,7 @@ use super::fixture::{BUNDLES, bits, model, plain, push, scene, sparse};
 /// Longer than any machine takes for a step.
 const FOREVER: Duration = Duration::from_secs(86_400);
 
+/// Verifies REQ-036.
 #[test]
 fn the_worker_gives_what_the_host_would_get() {
     for name in BUNDLES {
@@ -78,6 +79,7 @@ fn refused(model: &upt::Model) -> (Vec<u32>, Vec<f32>) {
 }
 
 /// The error of a submitted step is told once, however many submits lie between.
+/// Verifies REQ-036.
 #[test]
 fn an_error_that_was_not_told_is_never_lost() {
     let model = model("tiny-upt");
@@ -239,6 +241,7 @@ fn eight_scenes_on_one_model_go_on_beside_each_other() {
     }
 }
 
+/// Verifies REQ-036.
 #[test]
 fn concurrent_use_is_busy_and_never_waits() {
     let model = model("tiny-upt");

@@ -86,6 +86,7 @@ def the_length_of_a_step_is_asked_for():
 
 
 def a_socket_of_another_origin_is_refused():
+    """Verifies REQ-091."""
     with server(ROOT / "tests/fixtures/tiny-reduced") as (port, token):
         target = f"/socket?token={token}"
         for origin, host in [("http://evil.example", None), (None, None), ("same", "evil.example")]:

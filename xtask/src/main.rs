@@ -6,6 +6,7 @@ mod bench;
 mod counts;
 mod cross;
 mod demo;
+mod evidence;
 mod footprint;
 mod ort;
 mod package;
@@ -75,6 +76,13 @@ enum Task {
     Sbom {
         /// Packages; default: all of target/package.
         packages: Vec<std::path::PathBuf>,
+    },
+    /// Write what a manufacturer needs to know of libupt as software of unknown provenance (IEC 62304): requirements and their tests, anomalies, hashes.
+    #[command(after_help = "Example:\n  cargo xtask soup --out target/soup")]
+    Soup {
+        /// Folder for soup.json and soup.md.
+        #[arg(long, default_value = "target/soup")]
+        out: std::path::PathBuf,
     },
     /// Write a static site that shows organs, for any host.
     #[command(after_help = "Example:\n  cargo xtask site --out site")]
@@ -167,6 +175,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::View { bundle } => upkeep::view(workspace, &bundle),
         Task::Package(options) => package::run(workspace, &options),
         Task::Sbom { packages } => sbom::run(workspace, &packages),
+        Task::Soup { out } => upkeep::soup(workspace, &out),
         Task::Site { out } => web::site(workspace, &out),
         Task::Readme { reports, page } => upkeep::readme(workspace, &page, &reports),
         Task::Rivals { arguments } => rivals::run(workspace, &arguments),

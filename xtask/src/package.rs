@@ -109,7 +109,7 @@ fn script(workspace: &Workspace, words: &str, to: &Path) -> Result<()> {
     run_checked(workspace, words, workspace.python(words).arg(to))
 }
 
-/// The archive: of this platform, of one that is built for here, or of macOS laid out without libupt.
+/// The archive: of this platform (its library and command stripped, also of the number that tells builds in two folders apart), of one that is built for here, or of macOS laid out without libupt.
 fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
     ensure!(
         has_program("cmake"),
@@ -141,11 +141,10 @@ fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathB
         let command = root.join("bin").join(program);
         copy(&built.join(program), &command)?;
         if is_host && cfg!(target_os = "linux") {
-            run_checked(
-                workspace,
-                "strip",
-                workspace.command("strip", "").arg(&command),
-            )?;
+            let library = root.join("lib").join(library(platform)).canonicalize()?;
+            let words = "--remove-section=.note.gnu.build-id";
+            let mut strip = workspace.command("strip", words);
+            run_checked(workspace, "strip", strip.args([&command, &library]))?;
         }
         if windows && !is_host {
             cross::import_library(workspace, &built, &root.join("lib"))?;

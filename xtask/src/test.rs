@@ -4,8 +4,10 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use clap::Args;
+use serde_json::json;
 
 use crate::counts::{Counts, Outcome};
+use crate::evidence::{self, Tree};
 use crate::stages::{NIGHTLY, STAGES, Stage};
 use crate::system;
 use crate::workspace::Workspace;
@@ -55,6 +57,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         false => only.iter().any(|name| name == stage.name),
     };
 
+    let tree = Tree::now(workspace);
     let mut needs = vec![system::BASE];
     needs.extend(every().filter(asked).map(|stage| stage.needs));
     system::provide(workspace, &needs, !options.no_install)?;
@@ -70,6 +73,18 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         let skipped = || Outcome::skipped("nightly, or --only it");
         rows.extend(left_out.map(|stage| (stage.name, skipped(), 0.0)));
     }
+    let stages = rows.iter().map(|(name, outcome, seconds)| {
+        let counts = outcome.counts;
+        let row = json!({
+            "passed": counts.passed,
+            "failed": counts.failed,
+            "skipped": counts.skipped,
+            "seconds": seconds.round(),
+            "note": outcome.note,
+        });
+        ((*name).to_owned(), row)
+    });
+    evidence::write(workspace, &tree, stages.collect())?;
     Ok(summarise(&rows))
 }
 

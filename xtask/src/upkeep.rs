@@ -1,4 +1,4 @@
-//! `cargo xtask header`, `bundle`, `view`, `study` and `readme`: one program or one page, with its set-up.
+//! `cargo xtask header`, `bundle`, `soup`, `view`, `study` and `readme`: one program or one page, with its set-up.
 
 use std::path::{Path, PathBuf};
 
@@ -20,6 +20,12 @@ pub fn bundle(workspace: &Workspace, module: &str, arguments: &[String]) -> Resu
     let mut command = workspace.python("-m");
     workspace.with_parts(&mut command)?;
     run_visibly(command.arg(module).args(arguments))
+}
+
+/// Writes the file for IEC 62304; what it lacks is printed.
+pub fn soup(workspace: &Workspace, out: &Path) -> Result<bool> {
+    venv::create(workspace, "target/venv")?;
+    run_visibly(workspace.python("xtask/soup/soup.py").arg(out))
 }
 
 /// Runs `upt view` until it is ended.

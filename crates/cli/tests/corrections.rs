@@ -99,6 +99,7 @@ fn error(folder: &Path, corrections: Corrections) -> f64 {
     sum / 20.0
 }
 
+/// Verifies REQ-082.
 #[test]
 fn a_corrected_bundle_follows_the_solver_and_more_corrections_closer() {
     find_runtime();

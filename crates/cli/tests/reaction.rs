@@ -4,6 +4,7 @@ use tissue::mesh::{Boundary, box_phantom};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
 use upt::forces::ReactionForces;
 
+/// Verifies REQ-043.
 #[test]
 fn reaction_equals_the_reference_solvers() {
     let mut mesh = box_phantom([40.0, 40.0, 24.0], [10, 10, 6]).unwrap();

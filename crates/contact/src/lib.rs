@@ -12,6 +12,12 @@
 //!
 //! Lengths are millimetres, single precision throughout. Nothing here knows what tissue does under a force:
 //! the solver brings lumped masses, the runtime a dense compliance.
+//!
+//! REQ-040: A quick, thin or pointed tool does not pass through tissue between steps.
+//!
+//! REQ-042: Friction obeys Coulomb's law.
+//!
+//! REQ-045: A grasp pulls and tears off at its force.
 
 pub mod body;
 mod error;

@@ -62,6 +62,7 @@ fn serial(count: usize, task: &(dyn Fn(usize, usize) + Sync)) {
     (0..count).for_each(|chunk| task(chunk, 0));
 }
 
+/// Verifies REQ-081.
 #[test]
 fn they_are_those_of_the_law_on_every_instruction_set() {
     let law = Law::MooneyRivlin(MooneyRivlin { c01_share: 0.7 });

@@ -54,6 +54,7 @@ fn near(got: f64, want: f64, scale: f64) {
     assert!((got - want).abs() < 1e-9 * scale, "{got} for {want}");
 }
 
+/// Verifies REQ-081.
 #[test]
 fn stress_is_the_derivative_of_the_energy() {
     let f = [[1.3, 0.2, -0.1], [-0.15, 0.8, 0.25], [0.05, -0.3, 1.1]];

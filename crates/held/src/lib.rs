@@ -2,6 +2,8 @@
 //!
 //! Every field counts, whether it was there when somebody last thought of memory or not. `#[held(skip)]` leaves one out: it is shared
 //! with others, or of a type that holds nothing; `#[held(own)]` counts what an `Arc` points to, where no one else will. The trait is libupt's `crate::memory::HeldBytes`.
+//!
+//! REQ-035: The memory that models and scenes state is what they hold, to ten percent, and closing gives it back.
 
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};

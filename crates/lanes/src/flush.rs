@@ -1,6 +1,8 @@
 //! The floating-point mode of a computation, on the calling thread only and put back on drop, so that a host's environment
 //! is the same before and after a call. Exceptions are masked: a host that traps them must not die of an inexact
 //! product here. Denormals are flushed where they would cost hundreds of cycles each and carry no tissue motion.
+//!
+//! REQ-015: The host's floating-point environment is the same after a call, and a host that traps exceptions may call.
 
 use std::marker::PhantomData;
 

@@ -18,6 +18,8 @@
 //! | `touchable` | faces that tools may touch |
 //!
 //! Lengths are millimetres. Nothing here knows an element law or a time.
+//!
+//! REQ-061: Random cuts, removals and tools leave every state finite and lose no tissue.
 
 pub mod blade;
 pub mod body;

@@ -231,6 +231,7 @@ fn what_is_refused_changes_nothing() {
     assert!(body.is_intact() && body.node_count() == mesh.node_count());
 }
 
+/// Verifies REQ-061.
 #[test]
 fn ten_thousand_operations_break_nothing() {
     let mesh = block([3, 2, 2], 5.0, 0.25);

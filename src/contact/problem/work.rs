@@ -1,6 +1,8 @@
 //! What a step may cost: the multiplications and the time that are left to its contact solves, and those that are left to the whole of it.
 //!
 //! Work is counted and not timed, so that a step has the same bits on every machine; only a host's budget is a time.
+//!
+//! REQ-046: The work of a step is bounded for any poses of tools, and what it left undone is told by a flag.
 
 use crate::clock::Instant;
 use crate::memory::HeldBytes;

@@ -4,6 +4,10 @@
 //! Stages, each kept in a work folder and not made again: body (import, repair, tetrahedra, what is held and touched), columns
 //! (the linear response to every touch), modes (how it swings), tables, coarse space, refinement, check. A bundle is published as a whole
 //! folder as soon as it works, and again with each stage that makes it better.
+//!
+//! REQ-092: A run that is killed leaves nothing or a bundle that works, and goes on when it is started again.
+//!
+//! REQ-093: A made bundle carries a certificate of its errors on contacts that it has not seen, and it can be repeated.
 
 mod body;
 mod bundle;

@@ -1,4 +1,6 @@
 //! Accepts connections on 127.0.0.1: the page's files, and one WebSocket at a time.
+//!
+//! REQ-091: A page of another origin, a foreign host name and a wrong token are refused.
 
 use std::collections::VecDeque;
 use std::io::ErrorKind;

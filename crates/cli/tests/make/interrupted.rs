@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::{HELD, command, plain, text, works};
 
+/// Verifies REQ-092.
 #[test]
 fn killed_after_each_stage_it_leaves_nothing_or_a_bundle_that_works_and_goes_on() {
     let folder = tempfile::tempdir().unwrap();

@@ -124,6 +124,7 @@ fn works(bundle: &Path) {
     assert!(scene.stats().sleeping);
 }
 
+/// Verifies REQ-093.
 #[test]
 fn a_small_organ_end_to_end_and_checked_again() {
     let folder = tempfile::tempdir().unwrap();

@@ -8,6 +8,8 @@
 //!
 //! [`Ogden`]'s law has no such `w`: it is written in the principal stretches, has its own shear modulus, and files of its own for
 //! stress (`principal.rs`, `tangent.rs`) and kernel.
+//!
+//! REQ-081: The stress of every law is the derivative of its energy, on every instruction set.
 
 mod isochoric;
 mod mooney_rivlin;

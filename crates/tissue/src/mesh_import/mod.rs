@@ -16,6 +16,8 @@
 //! Coordinates are taken as millimetres times [`ImportOptions::scale`]. What is wrong with a file is
 //! an [`ImportError`] that names the element; with [`ImportOptions::repair`] the fault is removed
 //! where that is safe and listed in [`Imported::repairs`].
+//!
+//! REQ-090: A damaged mesh file is refused or read within bounds of memory and work.
 
 mod bodies;
 mod body;

@@ -5,6 +5,8 @@
 //! frame (50 ms in the paper, 500 inner steps of 0.1 ms); contact nodes are led
 //! on straight lines to their prescribed displacement. The result has the same
 //! bits for any number of threads.
+//!
+//! REQ-080: The reference solver agrees with CalculiX and with closed forms.
 
 mod barrier;
 mod body_load;

@@ -47,6 +47,7 @@ fn read(path: &Path) -> bool {
     is_body
 }
 
+/// Verifies REQ-090.
 #[test]
 fn damaged_files_are_refused_or_read_within_bounds() {
     let folder = tempfile::tempdir().unwrap();

@@ -120,6 +120,7 @@ fn compare_equilibria(mesh: &Mesh, case: &Case) {
     );
 }
 
+/// Verifies REQ-080.
 #[cfg(feature = "linear")]
 #[test]
 fn equilibria_of_both_laws_agree_with_calculix_to_its_printed_digits() {

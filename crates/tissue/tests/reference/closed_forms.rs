@@ -115,6 +115,7 @@ fn check(f: Matrix, pressure: Pressure) {
     }
 }
 
+/// Verifies REQ-080.
 #[test]
 fn a_general_linear_field_passes_the_patch_test() {
     let f = [[1.05, 0.1, -0.03], [0.02, 0.97, 0.06], [0.0, -0.04, 1.02]];
