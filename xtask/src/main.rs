@@ -134,6 +134,9 @@ enum Task {
         /// Only say whether they are up to date.
         #[arg(long)]
         check: bool,
+        /// Write the dump of the ABI that the stage `abi` compares with: at a release.
+        #[arg(long, conflicts_with = "check")]
+        release: bool,
     },
     /// Train, evaluate or export bundles: runs the Python package with its environment set up.
     #[command(
@@ -181,7 +184,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Rivals { arguments } => rivals::run(workspace, &arguments),
         Task::Study { arguments } => upkeep::study(workspace, &arguments),
         Task::Footprint { page } => footprint::run(workspace, page.as_deref()),
-        Task::Header { check } => upkeep::header(workspace, check),
+        Task::Header { check, release } => upkeep::header(workspace, check, release),
         Task::Bundle { module, arguments } => upkeep::bundle(workspace, &module, &arguments),
         Task::Ort { platform, version } => {
             let platform = platform.map_or_else(ort::Platform::host, Ok)?;

@@ -48,6 +48,7 @@ pub const STAGES: &[&[&[Stage]]] = &[
         stage("clippy", "cargo clippy, warnings are errors; also of builds with a single feature or none", "", Function(clippy)),
         stage("rustdoc", "cargo doc of the libraries, warnings are errors", "", Function(rustdoc)),
         stage("style", "ruff, clang-format, dependencies, licences, circles and upward imports, sizes of files", "", Function(style)),
+        stage("abi", "nothing of the last release's C ABI is gone or has changed", "", Cargo("run --release -p upt-bindgen -- --stays")),
         stage("rust", "cargo test --release --workspace", "", Function(rust)),
     ]],
     &[

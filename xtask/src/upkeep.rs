@@ -9,9 +9,13 @@ use crate::workspace::{Workspace, write_between_markers};
 use crate::{ort, venv};
 
 /// Writes include/upt.h and the C# bindings from the library's source.
-pub fn header(workspace: &Workspace, check: bool) -> Result<bool> {
-    let check = if check { "--check" } else { "" };
-    run_visibly(&mut workspace.cargo(&format!("run --quiet --release -p upt-bindgen -- {check}")))
+pub fn header(workspace: &Workspace, check: bool, release: bool) -> Result<bool> {
+    let word = match (check, release) {
+        (true, _) => "--check",
+        (_, true) => "--release",
+        _ => "",
+    };
+    run_visibly(&mut workspace.cargo(&format!("run --quiet --release -p upt-bindgen -- {word}")))
 }
 
 /// Runs the Python package's command line with the environment set up: `cargo xtask bundle -- export ...`.

@@ -2,6 +2,7 @@
 //! structs, JavaScript's table and the reference in `docs/reference/abi.md`. All are committed; the test `fresh` fails when they are stale.
 
 pub mod csharp;
+pub mod dump;
 pub mod python;
 pub mod reference;
 pub mod source;
