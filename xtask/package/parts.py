@@ -29,7 +29,8 @@ TARGETS = {
     "win_amd64": "x86_64-pc-windows-gnu",
     "arm64": "aarch64-apple-darwin",
 }
-LIBRARIES = ("libupt.so", "upt.dll", "libupt.dylib", "upt.wasm")
+LIBRARY = re.compile(r"libupt\.so[.\d]*|upt\.dll|libupt\.dylib|upt\.wasm")
+RUNTIME = re.compile(r"libonnxruntime\.so[.\d]*|onnxruntime\.dll|libonnxruntime\.dylib")
 
 
 @dataclass
@@ -133,9 +134,9 @@ def of(package: Path) -> tuple[Part, list[Part]]:
     library = command = False
     for name, content in members(package):
         path, digest = PurePosixPath(name), hashlib.sha256(content).hexdigest()
-        library = library or any(path.name.startswith(one) for one in LIBRARIES)
+        library = library or bool(LIBRARY.fullmatch(path.name))
         command = command or path.name in ("upt", "upt.exe")
-        if re.match(r"(lib)?onnxruntime\.(so|dll|dylib)", path.name):
+        if RUNTIME.fullmatch(path.name):
             runtime = version_of("crates/ort-wheel/src/lib.rs", r'VERSION: &str = "([^"]+)"')
             source = f"https://github.com/microsoft/onnxruntime/tree/v{runtime}"
             purl = f"pkg:pypi/onnxruntime@{runtime}"
