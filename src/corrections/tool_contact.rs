@@ -156,6 +156,7 @@ impl ImplicitSolver {
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
+        let _span = tracing::trace_span!("guess").entered();
         self.guess_loaded(context, input, problem, at, report)?;
         self.guess.copy_from_slice(at.u);
         problem.keep_guess()?;

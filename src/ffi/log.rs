@@ -1,4 +1,5 @@
-//! The log callback: a `tracing` subscriber that forwards events and the ends of spans of this library and of `ort`.
+//! The log callback: a `tracing` subscriber that forwards events and the ends of spans of this library and of `ort`; spans go to a trace too
+//! (`trace.rs`), where the process wants one.
 //!
 //! The callback runs on the host's threads only, inside of its calls. A managed host (Mono in Unity) takes each native
 //! thread that calls into it for one of its own, and its domain reload then waits for that thread for ever. So what
@@ -12,7 +13,7 @@ use std::collections::{HashMap, VecDeque};
 use std::ffi::{CString, c_void};
 use std::fmt::{Debug, Write};
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU64, Ordering};
-use std::sync::{LazyLock, Mutex, Once, PoisonError, RwLock};
+use std::sync::{LazyLock, Mutex, MutexGuard, Once, PoisonError, RwLock};
 
 use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
@@ -22,6 +23,7 @@ use tracing::{Event, Level, Metadata, Subscriber};
 use super::constants::*;
 use super::failure::{Answer, fail};
 use super::structs::upt_log_fn;
+use super::trace;
 
 struct Receiver {
     callback: upt_log_fn,
@@ -62,6 +64,7 @@ pub(super) struct HostCall;
 impl HostCall {
     pub(super) fn enter() -> HostCall {
         let _ = DEPTH.try_with(|depth| depth.set(depth.get() + 1));
+        begin_trace();
         HostCall
     }
 }
@@ -91,7 +94,36 @@ fn take_waiting() -> VecDeque<(i32, String)> {
     std::mem::take(&mut *waiting)
 }
 
+/// Why there is no trace, for the first receiver.
+static TRACE_FAULT: Mutex<Option<String>> = Mutex::new(None);
+
+fn lock_fault() -> MutexGuard<'static, Option<String>> {
+    TRACE_FAULT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Makes spans for a trace where the process wants one; at its first call.
+fn begin_trace() {
+    static BEGIN: Once = Once::new();
+    BEGIN.call_once(|| match trace::start() {
+        Ok(()) if trace::is_on() => {
+            install();
+        }
+        Ok(()) => {}
+        Err(fault) => *lock_fault() = Some(fault),
+    });
+}
+
+/// Makes this file the process's subscriber; false where the process has one of its own.
+fn install() -> bool {
+    INSTALL.call_once(|| {
+        let done = tracing::subscriber::set_global_default(Forward).is_ok();
+        INSTALLED.store(done.into(), Ordering::Release);
+    });
+    INSTALLED.load(Ordering::Acquire) != 0
+}
+
 struct OpenSpan {
+    name: &'static str,
     text: String,
     level: i32,
     start: Instant,
@@ -99,17 +131,11 @@ struct OpenSpan {
 }
 
 pub(super) fn set(callback: upt_log_fn, user: *mut c_void, level: i32) -> Answer {
-    if callback.is_some() && level != UPT_LOG_OFF {
-        INSTALL.call_once(|| {
-            let done = tracing::subscriber::set_global_default(Forward).is_ok();
-            INSTALLED.store(done.into(), Ordering::Release);
-        });
-        if INSTALLED.load(Ordering::Acquire) == 0 {
-            return fail(
-                UPT_ERR_STATE,
-                "the process has its own tracing subscriber; receive the log there",
-            );
-        }
+    if callback.is_some() && level != UPT_LOG_OFF && !install() {
+        return fail(
+            UPT_ERR_STATE,
+            "the process has its own tracing subscriber; receive the log there",
+        );
     }
     let mut receiver = RECEIVER.write().unwrap_or_else(PoisonError::into_inner);
     *receiver = Receiver { callback, user };
@@ -120,6 +146,12 @@ pub(super) fn set(callback: upt_log_fn, user: *mut c_void, level: i32) -> Answer
         UPT_LOG_OFF
     };
     LEVEL.store(level, Ordering::Release);
+    drop(receiver);
+    if is_told(UPT_LOG_WARN)
+        && let Some(fault) = lock_fault().take()
+    {
+        emit(UPT_LOG_WARN, fault);
+    }
     Ok(UPT_OK)
 }
 
@@ -171,6 +203,11 @@ impl Visit for Text {
     }
 }
 
+/// Whether the receiver wants messages of a level.
+fn is_told(level: i32) -> bool {
+    level <= LEVEL.load(Ordering::Acquire)
+}
+
 struct Forward;
 
 impl Subscriber for Forward {
@@ -183,13 +220,14 @@ impl Subscriber for Forward {
     }
 
     fn enabled(&self, metadata: &Metadata<'_>) -> bool {
-        level_of(metadata) <= LEVEL.load(Ordering::Acquire)
+        is_told(level_of(metadata)) || (metadata.is_span() && trace::is_on())
     }
 
     fn new_span(&self, attributes: &Attributes<'_>) -> Id {
         let mut text = Text(attributes.metadata().name().to_owned());
         attributes.record(&mut text);
         let span = OpenSpan {
+            name: attributes.metadata().name(),
             text: text.0,
             level: level_of(attributes.metadata()),
             start: Instant::now(),
@@ -239,9 +277,14 @@ impl Subscriber for Forward {
             Some(span) if span.references > 1 => span.references -= 1,
             Some(_) => {
                 let span = spans.remove(&id).expect("looked up under the same lock");
+                let last = spans.is_empty();
                 drop(spans);
-                let milliseconds = span.start.elapsed().as_secs_f64() * 1e3;
-                emit(span.level, format!("{}: {milliseconds:.3} ms", span.text));
+                let fields = span.text[span.name.len()..].trim_start();
+                trace::span(span.name, fields, span.start, last);
+                if is_told(span.level) {
+                    let milliseconds = span.start.elapsed().as_secs_f64() * 1e3;
+                    emit(span.level, format!("{}: {milliseconds:.3} ms", span.text));
+                }
                 return true;
             }
             None => {}

@@ -34,6 +34,7 @@ mod step_structs;
 mod structs;
 mod surface;
 mod ties;
+mod trace;
 mod worker;
 
 #[cfg(feature = "fault")]

@@ -30,6 +30,7 @@ impl Core {
         published: &RwLock<Published>,
         input: &StepInput<'_>,
     ) -> Result<bool> {
+        let _span = tracing::trace_span!("search").entered();
         self.driven = match input.contact {
             Contact::Tools(_) => true,
             Contact::None => self.counters.driven,

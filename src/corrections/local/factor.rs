@@ -175,6 +175,7 @@ impl NearFactor {
 
     /// Makes the factor that serves a state `[K,3]`: that of the state where it was taken last, unless that is another's or has been deformed since.
     pub fn renew(&mut self, env: Env<'_>, near: &NearSet, moduli: Moduli, u: &[f32]) -> Result<()> {
+        let _span = tracing::trace_span!("factor").entered();
         let kappa = env.time_step.integrator.kappa() as f32;
         let serves = self.current.is_of(&near.centres, kappa)
             && self.current.u.len() == 3 * near.nodes.len()

@@ -28,6 +28,7 @@ impl LocalSolver {
         way: f32,
         sunk: impl Fn(&mut ContactProblem, &[f32]) -> f32,
     ) -> Result<Gain> {
+        let _span = tracing::trace_span!("iteration").entered();
         let env = step.context.env();
         let known = self.columns.count();
         self.descend(step, problem)?;
@@ -180,6 +181,7 @@ impl LocalSolver {
         base: &[f32],
         way: f32,
     ) -> Result<()> {
+        let _span = tracing::trace_span!("contact").entered();
         let env = step.context.env();
         self.place_at(base, 1.0);
         let state = State {

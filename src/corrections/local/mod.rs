@@ -206,6 +206,7 @@ impl LocalSolver {
 
     /// Starts from `base`, with `touched` nodes.
     pub(super) fn begin(&mut self, step: &mut StepContext<'_>, base: Base<'_>) -> Result<()> {
+        let _span = tracing::trace_span!("reach").entered();
         let env = step.context.env();
         let far = &step.context.corrections.far;
         let rest = step.input.rest;
