@@ -240,6 +240,21 @@
 #define UPT_CORRECTIONS_AUTO -2
 
 /**
+ * A switch: as usual, which its field says.
+ */
+#define UPT_SWITCH_DEFAULT 0
+
+/**
+ * A switch: on.
+ */
+#define UPT_SWITCH_ON 1
+
+/**
+ * A switch: off.
+ */
+#define UPT_SWITCH_OFF 2
+
+/**
  * Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
  * under `UPT_GUARD_BLEND`.
  */
@@ -530,9 +545,9 @@ typedef struct upt_model_options {
    */
   uint8_t cuda_graph;
   /**
-   * 1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model.
+   * `UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`.
    */
-  uint8_t no_fallback;
+  uint8_t fallback;
   /**
    * Zero.
    */
@@ -643,9 +658,9 @@ typedef struct upt_scene_options {
    */
   uint8_t free_boundary;
   /**
-   * 1: never sleep.
+   * `UPT_SWITCH_*`: tissue at rest sleeps, usually on.
    */
-  uint8_t no_sleep;
+  uint8_t sleep;
   /**
    * 1: the guard looks for inverted elements in each step.
    */
@@ -1225,9 +1240,9 @@ typedef struct upt_haptics_options {
    */
   float damping_limit_n_s_per_m;
   /**
-   * 1: no passivity observer and controller.
+   * `UPT_SWITCH_*`: passivity observer and controller, usually on.
    */
-  uint8_t no_passivity;
+  uint8_t passivity;
   /**
    * Zero.
    */

@@ -138,7 +138,7 @@ pub enum StepPath {
 }
 
 /// Options of [`crate::Model::open`].
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct ModelOptions {
     /// Threads of a step; 0 takes [`InitOptions::threads`].
     pub threads: usize,
@@ -159,8 +159,25 @@ pub struct ModelOptions {
     pub cuda_graph: bool,
     /// Run the graphs on this stream; `None`: one of ONNX Runtime's own. Needs a GPU provider in the list.
     pub user_stream: Option<UserStream>,
-    /// Fail with [`crate::Error::Provider`] instead of falling back to the next provider.
-    pub no_fallback: bool,
+    /// Try the next provider where one cannot run the model; otherwise [`crate::Error::Provider`].
+    pub fallback: bool,
+}
+
+impl Default for ModelOptions {
+    fn default() -> Self {
+        Self {
+            threads: 0,
+            providers: Vec::new(),
+            device_id: 0,
+            precision: None,
+            gpu_memory_limit: 0,
+            cache_dir: None,
+            allow_tf32: false,
+            cuda_graph: false,
+            user_stream: None,
+            fallback: true,
+        }
+    }
 }
 
 /// Options of [`crate::Scene::new`].
@@ -180,8 +197,8 @@ pub struct SceneOptions {
     pub mesh_path: Option<PathBuf>,
     /// Do not enforce held and contact nodes.
     pub free_boundary: bool,
-    /// Never sleep.
-    pub no_sleep: bool,
+    /// Tissue at rest sleeps.
+    pub sleep: bool,
     /// Check the sign of every decoded tetrahedron's volume.
     pub check_inversion: bool,
     /// [`crate::Scene::submit`] replaces an input that has not started instead of failing.
@@ -254,7 +271,7 @@ impl Default for SceneOptions {
             guard_policy: GuardPolicy::Hold,
             mesh_path: None,
             free_boundary: false,
-            no_sleep: false,
+            sleep: true,
             check_inversion: false,
             latest_wins: false,
             cubic_sampling: false,

@@ -141,7 +141,7 @@ fn shorter_steps_are_the_same_tissue() {
 fn after_a_release_it_comes_to_rest_and_sleeps() {
     for corrections in [8, 1] {
         let options = SceneOptions {
-            no_sleep: false,
+            sleep: true,
             corrections: Corrections::Fixed(corrections),
             ..stepping(0.01)
         };

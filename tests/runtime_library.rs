@@ -77,7 +77,7 @@ fn bad_libraries_are_errors_and_a_good_one_loads_after_them() {
         assert!(reason.contains("broken.so"), "{reason}");
         assert!(!refused[1]["reason"].as_str().unwrap().is_empty());
         let strict = ModelOptions {
-            no_fallback: true,
+            fallback: false,
             ..wish
         };
         let error = Model::open(&fixture::path("tiny-upt"), &strict)

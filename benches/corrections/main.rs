@@ -93,7 +93,7 @@ fn tools(model: &Model) -> upt::Result<Vec<Tool>> {
 fn take(model: &Arc<Model>, way: &[Tool], k: u32, threads: usize) -> upt::Result<Taken> {
     let options = SceneOptions {
         threads,
-        no_sleep: true,
+        sleep: false,
         corrections: Corrections::Fixed(k),
         ..SceneOptions::default()
     };

@@ -139,7 +139,7 @@ fn options(threads: usize) -> SceneOptions {
     SceneOptions {
         threads,
         guard_policy: GuardPolicy::Report,
-        no_sleep: true,
+        sleep: false,
         // What the learned part costs; corrections are measured by training/scripts/corrections_table.py.
         corrections: Corrections::None,
         ..SceneOptions::default()

@@ -16,7 +16,7 @@ pub fn measure(model: &Arc<Model>, name: &str) -> upt::Result<()> {
     let scene = Scene::new(
         Arc::clone(model),
         &SceneOptions {
-            no_sleep: false,
+            sleep: true,
             ..options(1)
         },
     )?;

@@ -78,7 +78,7 @@ def main() -> None:
                 tail = (out.ctypes.data, out.size, len(seconds), seconds.ctypes.data)
                 check(steps(scene._handle, described, *where, len(nodes), *tail))
 
-            with model.scene(no_sleep=True) as scene:
+            with model.scene(sleep=False) as scene:
                 found = {run: np.empty((arguments.turns, arguments.calls)) for run in (in_c, in_python)}
                 for turn in range(arguments.turns):
                     for run in (in_c, in_python) if turn % 2 else (in_python, in_c):

@@ -35,7 +35,7 @@ def main() -> None:
 
     about = machine()
     model = upt.Model(arguments.bundle)
-    batch = upt.BatchedScenes(model, arguments.scenes, no_sleep=True)
+    batch = upt.BatchedScenes(model, arguments.scenes, sleep=False)
     domain = model.domain_nodes
     contacts = [(domain[i : i + 4], np.tile(np.float32([0, 0, -2]), (4, 1))) for i in range(arguments.scenes)]
     out = np.empty((arguments.scenes, model.node_count, 3), np.float32)

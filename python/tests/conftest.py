@@ -27,7 +27,7 @@ def model(name) -> upt.Model:
 
 @pytest.fixture
 def scene(model) -> upt.Scene:
-    with model.scene(no_sleep=True) as scene:
+    with model.scene(sleep=False) as scene:
         yield scene
 
 

@@ -145,7 +145,7 @@ def test_nodes_and_vectors_for_hosts_that_want_them(model, scene):
 def test_a_frame_shows_the_tool_where_it_is(corrected):
     """Between steps the tissue follows the tool; at the step's own moment it is the step."""
     assert corrected.frame_step_s == pytest.approx(corrected.dt), "this one recommends none of its own"
-    with corrected.scene(no_sleep=True, step_s=corrected.frame_step_s) as scene:
+    with corrected.scene(sleep=False, step_s=corrected.frame_step_s) as scene:
         ball = upt.Instrument.capsule(3.0, position=pressing(corrected, 0.3))
         scene.present(0.0)  # before the first step
         state = scene.step([ball])
@@ -169,7 +169,7 @@ def test_a_frame_shows_the_tool_where_it_is(corrected):
 def test_a_collision_field_is_presented_too(corrected):
     """Listed nodes are where they are asked to be; points at nodes go with them."""
     nodes = corrected.domain_nodes[:4]
-    with corrected.scene(no_sleep=True) as scene:
+    with corrected.scene(sleep=False) as scene:
         scene.attach_points(corrected.positions[nodes])
         for depth in (0.2, 0.4):
             scene.step(contacts=(nodes, np.tile([0, 0, -depth], (4, 1))))

@@ -24,7 +24,7 @@ def test_a_scene_follows_the_stored_rollout(name, scene):
 
 
 def test_dense_fields_and_listed_contacts_give_the_same_bits(model, scene):
-    dense = model.scene(no_sleep=True)
+    dense = model.scene(sleep=False)
     state = np.zeros((model.node_count, 3), np.float32)
     for t in range(5):
         nodes, vectors = push(model, t)
@@ -44,16 +44,16 @@ def test_arrays_of_the_right_type_are_not_copied(model, scene):
     # In place: the result over the input.
     collision = np.zeros_like(out)
     collision[model.domain_nodes[0]] = [0, 0, -1]
-    expected = model.scene(no_sleep=True).step(displacement=np.zeros_like(out), collision=collision)
+    expected = model.scene(sleep=False).step(displacement=np.zeros_like(out), collision=collision)
     out[:] = 0
-    model.scene(no_sleep=True).step(displacement=out, collision=collision, out=out)
+    model.scene(sleep=False).step(displacement=out, collision=collision, out=out)
     np.testing.assert_array_equal(out, expected)
 
 
 def test_contacts_are_the_same_bits_copied_or_not(model, scene):
     """The lists need not lie in one piece, and may come again with other values in them."""
     nodes, vectors = push(model, 3)
-    other = model.scene(no_sleep=True)
+    other = model.scene(sleep=False)
     expected = other.step(contacts=(nodes.tolist(), vectors.tolist()))
     apart = np.repeat(nodes, 2)[::2], np.repeat(vectors, 2, axis=1)[:, ::2]
     np.testing.assert_array_equal(scene.step(contacts=apart), expected)
@@ -70,7 +70,7 @@ def test_contacts_are_the_same_bits_copied_or_not(model, scene):
 def test_other_types_are_converted(model, scene, convert):
     nodes, vectors = push(model, 1)
     expected = scene.step(contacts=(nodes, vectors))
-    other = model.scene(no_sleep=True)
+    other = model.scene(sleep=False)
     given = vectors.tolist() if convert is list else vectors.astype(convert)
     np.testing.assert_array_equal(other.step(contacts=(nodes.astype(np.int64), given)), expected)
 
@@ -99,7 +99,7 @@ def test_a_snapshot_resumes_to_the_bit(model, scene):
         scene.step(contacts=push(model, t))
     snapshot = scene.save()
     after = [scene.step(contacts=push(model, t)) for t in range(3, 6)]
-    other = model.scene(no_sleep=True)
+    other = model.scene(sleep=False)
     other.restore(snapshot)
     for t, expected in zip(range(3, 6), after, strict=True):
         np.testing.assert_array_equal(other.step(contacts=push(model, t)), expected)
@@ -111,7 +111,7 @@ def test_a_submitted_step_is_the_same_step(model, scene):
     nodes, vectors = push(model, 2)
     scene.submit(contacts=(nodes, vectors))
     assert scene.wait()
-    expected = model.scene(no_sleep=True).step(contacts=(nodes, vectors))
+    expected = model.scene(sleep=False).step(contacts=(nodes, vectors))
     np.testing.assert_array_equal(scene.read(), expected)
     np.testing.assert_allclose(scene.sample(0.5), expected / 2, atol=1e-6)
     with pytest.raises(upt.StateError):
@@ -156,9 +156,9 @@ def test_the_gil_is_free_during_a_call():
 
 def test_scenes_outlive_their_model(name, model):
     own = upt.Model(FIXTURES / name)
-    scene = own.scene(no_sleep=True)
+    scene = own.scene(sleep=False)
     own.close()
-    expected = model.scene(no_sleep=True).step(contacts=push(model, 1))
+    expected = model.scene(sleep=False).step(contacts=push(model, 1))
     np.testing.assert_array_equal(scene.step(contacts=push(model, 1)), expected)
     scene.close()
     scene.close()

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from enum import IntEnum, IntFlag
 from typing import Any, TypedDict
 
-from upt._record import Record, boolean, choice, numbers, text, vector
+from upt._record import Record, boolean, choice, numbers, switch, text, vector
 
 ABI_VERSION = 1
 """Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load."""
@@ -146,6 +146,17 @@ class Corrections(IntEnum):
     """No corrections."""
     AUTO = -2
     """As many corrections as the scene's target needs and its budget allows."""
+
+
+class Switch(IntEnum):
+    """`UPT_SWITCH_*`."""
+
+    DEFAULT = 0
+    """A switch: as usual, which its field says."""
+    ON = 1
+    """A switch: on."""
+    OFF = 2
+    """A switch: off."""
 
 
 class GuardPolicy(IntEnum):
@@ -310,8 +321,8 @@ class ModelOptions(Record):
     """1: TF32 products allowed (CUDA; errors near 1e-3)."""
     cuda_graph: bool = boolean("_cuda_graph")
     """1: capture CUDA graphs."""
-    no_fallback: bool = boolean("_no_fallback")
-    """1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model."""
+    fallback: bool | None = switch("_fallback")
+    """`UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`."""
     reserved: int
     """Zero."""
     user_stream: int | None
@@ -328,7 +339,7 @@ class ModelOptions(Record):
         ("_cache_dir", ctypes.c_char_p),
         ("_allow_tf32", ctypes.c_uint8),
         ("_cuda_graph", ctypes.c_uint8),
-        ("_no_fallback", ctypes.c_uint8),
+        ("_fallback", ctypes.c_uint8),
         ("reserved", ctypes.c_uint8),
         ("user_stream", ctypes.c_void_p),
     ]
@@ -353,8 +364,8 @@ class ModelOptionsKeywords(TypedDict, total=False):
     """1: TF32 products allowed (CUDA; errors near 1e-3)."""
     cuda_graph: bool
     """1: capture CUDA graphs."""
-    no_fallback: bool
-    """1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model."""
+    fallback: bool | None
+    """`UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`."""
     user_stream: int | None
     """A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own."""
 
@@ -430,8 +441,8 @@ class SceneOptions(Record):
     """A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's."""
     free_boundary: bool = boolean("_free_boundary")
     """1: do not enforce held and contact nodes."""
-    no_sleep: bool = boolean("_no_sleep")
-    """1: never sleep."""
+    sleep: bool | None = switch("_sleep")
+    """`UPT_SWITCH_*`: tissue at rest sleeps, usually on."""
     check_inversion: bool = boolean("_check_inversion")
     """1: the guard looks for inverted elements in each step."""
     latest_wins: bool = boolean("_latest_wins")
@@ -471,7 +482,7 @@ class SceneOptions(Record):
         ("_guard_policy", ctypes.c_int32),
         ("_mesh_path", ctypes.c_char_p),
         ("_free_boundary", ctypes.c_uint8),
-        ("_no_sleep", ctypes.c_uint8),
+        ("_sleep", ctypes.c_uint8),
         ("_check_inversion", ctypes.c_uint8),
         ("_latest_wins", ctypes.c_uint8),
         ("_cubic_sampling", ctypes.c_uint8),
@@ -503,8 +514,8 @@ class SceneOptionsKeywords(TypedDict, total=False):
     """A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's."""
     free_boundary: bool
     """1: do not enforce held and contact nodes."""
-    no_sleep: bool
-    """1: never sleep."""
+    sleep: bool | None
+    """`UPT_SWITCH_*`: tissue at rest sleeps, usually on."""
     check_inversion: bool
     """1: the guard looks for inverted elements in each step."""
     latest_wins: bool
@@ -552,8 +563,8 @@ class HapticsOptions(Record):
     """Longest force, N; 0: no limit."""
     damping_limit_n_s_per_m: float
     """The most that the passivity controller damps, N s/m; 0: 5."""
-    no_passivity: bool = boolean("_no_passivity")
-    """1: no passivity observer and controller."""
+    passivity: bool | None = switch("_passivity")
+    """`UPT_SWITCH_*`: passivity observer and controller, usually on."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
 
@@ -565,7 +576,7 @@ class HapticsOptions(Record):
         ("step_latency_ms", ctypes.c_float),
         ("force_limit_n", ctypes.c_float),
         ("damping_limit_n_s_per_m", ctypes.c_float),
-        ("_no_passivity", ctypes.c_uint8),
+        ("_passivity", ctypes.c_uint8),
         ("_reserved", ctypes.c_uint8 * 7),
     ]
 
@@ -585,8 +596,8 @@ class HapticsOptionsKeywords(TypedDict, total=False):
     """Longest force, N; 0: no limit."""
     damping_limit_n_s_per_m: float
     """The most that the passivity controller damps, N s/m; 0: 5."""
-    no_passivity: bool
-    """1: no passivity observer and controller."""
+    passivity: bool | None
+    """`UPT_SWITCH_*`: passivity observer and controller, usually on."""
 
 
 class HapticPose(Record):

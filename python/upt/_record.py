@@ -76,6 +76,19 @@ def choice(raw: str, kind: type[IntEnum] | type[IntFlag]) -> Any:
     return property(read, write)
 
 
+def switch(raw: str) -> Any:
+    """On, off, or as usual: `True`, `False`, `None`."""
+    meanings = {0: None, 1: True, 2: False}
+
+    def read(record: Any) -> bool | None:
+        return meanings.get(getattr(record, raw))
+
+    def write(record: Any, value: Any) -> None:
+        setattr(record, raw, 0 if value is None else 1 if value else 2)
+
+    return property(read, write)
+
+
 def boolean(raw: str) -> Any:
     """A byte that is 0 or 1."""
 

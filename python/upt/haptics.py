@@ -59,7 +59,7 @@ class Haptics:
             step_latency_ms=step_latency_ms,
             force_limit_n=force_limit,
             damping_limit_n_s_per_m=damping_limit,
-            no_passivity=not passivity,
+            passivity=passivity,
         )
         handle = ctypes.c_void_p()
         check(lib.upt_haptics_create(scene._handle, ctypes.byref(options), ctypes.byref(handle)))

@@ -63,6 +63,13 @@ pub const UPT_CORRECTIONS_NONE: i32 = -1;
 /// As many corrections as the scene's target needs and its budget allows.
 pub const UPT_CORRECTIONS_AUTO: i32 = -2;
 
+/// A switch: as usual, which its field says.
+pub const UPT_SWITCH_DEFAULT: i32 = 0;
+/// A switch: on.
+pub const UPT_SWITCH_ON: i32 = 1;
+/// A switch: off.
+pub const UPT_SWITCH_OFF: i32 = 2;
+
 /// Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
 /// under `UPT_GUARD_BLEND`.
 pub const UPT_GUARD_HOLD: i32 = 0;

@@ -149,6 +149,18 @@ pub(super) fn flag(field: &str, value: u8) -> Result<bool, Failure> {
     }
 }
 
+/// `UPT_SWITCH_*`, of which the default is on.
+pub(super) fn switch(field: &str, value: u8) -> Result<bool, Failure> {
+    match i32::from(value) {
+        UPT_SWITCH_DEFAULT | UPT_SWITCH_ON => Ok(true),
+        UPT_SWITCH_OFF => Ok(false),
+        _ => fail(
+            UPT_ERR_ARGUMENT,
+            format!("{field} is {value}; a switch is 0 (as usual), 1 (on) or 2 (off)"),
+        ),
+    }
+}
+
 pub(super) fn reserved(bytes: &[u8]) -> Result<(), Failure> {
     match bytes.iter().all(|&byte| byte == 0) {
         true => Ok(()),
@@ -212,7 +224,7 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
         // SAFETY: the host promises that a stream which is not NULL outlives the model and its scenes.
         user_stream: (!raw.user_stream.is_null())
             .then(|| unsafe { UserStream::new(raw.user_stream) }),
-        no_fallback: flag("no_fallback", raw.no_fallback)?,
+        fallback: switch("fallback", raw.fallback)?,
     })
 }
 
@@ -256,7 +268,7 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
         // SAFETY: NULL or a C string, as the header asks.
         mesh_path: unsafe { optional_path(raw.mesh_path, "mesh_path") }?,
         free_boundary: flag("free_boundary", raw.free_boundary)?,
-        no_sleep: flag("no_sleep", raw.no_sleep)?,
+        sleep: switch("sleep", raw.sleep)?,
         check_inversion: flag("check_inversion", raw.check_inversion)?,
         latest_wins: flag("latest_wins", raw.latest_wins)?,
         cubic_sampling: flag("cubic_sampling", raw.cubic_sampling)?,

@@ -37,7 +37,7 @@ pub unsafe extern "C" fn upt_haptics_create(
         // SAFETY: the host passes a struct whose first field is its size, as the header asks.
         let raw = unsafe { required(options, "options") }?;
         convert::reserved(&raw.reserved)?;
-        let passivity = !convert::flag("no_passivity", raw.no_passivity)?;
+        let passivity = convert::switch("passivity", raw.passivity)?;
         // SAFETY: the host passes a struct whose first field is its size, as the header asks.
         let tool = unsafe { required(raw.tool, "options.tool") }?;
         features::instruments()?;

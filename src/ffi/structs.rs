@@ -70,8 +70,8 @@ pub struct upt_model_options {
     pub allow_tf32: u8,
     /// 1: capture CUDA graphs.
     pub cuda_graph: u8,
-    /// 1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model.
-    pub no_fallback: u8,
+    /// `UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`.
+    pub fallback: u8,
     /// Zero.
     pub reserved: u8,
     /// A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.
@@ -135,8 +135,8 @@ pub struct upt_scene_options {
     pub mesh_path: *const c_char,
     /// 1: do not enforce held and contact nodes.
     pub free_boundary: u8,
-    /// 1: never sleep.
-    pub no_sleep: u8,
+    /// `UPT_SWITCH_*`: tissue at rest sleeps, usually on.
+    pub sleep: u8,
     /// 1: the guard looks for inverted elements in each step.
     pub check_inversion: u8,
     /// 1: a submit while a step is in flight replaces the waiting contact and does not return `UPT_ERR_BUSY`.
@@ -188,8 +188,8 @@ pub struct upt_haptics_options {
     pub force_limit_n: f32,
     /// The most that the passivity controller damps, N s/m; 0: 5.
     pub damping_limit_n_s_per_m: f32,
-    /// 1: no passivity observer and controller.
-    pub no_passivity: u8,
+    /// `UPT_SWITCH_*`: passivity observer and controller, usually on.
+    pub passivity: u8,
     /// Zero.
     pub reserved: [u8; 7],
 }

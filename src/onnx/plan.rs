@@ -19,7 +19,7 @@ impl ProviderPlan {
     pub fn new(options: &ModelOptions) -> ProviderPlan {
         let mut options = options.clone();
         let order = &mut options.providers;
-        if order.is_empty() || (!options.no_fallback && !order.contains(&Provider::Cpu)) {
+        if order.is_empty() || (options.fallback && !order.contains(&Provider::Cpu)) {
             order.push(Provider::Cpu);
         }
         ProviderPlan {

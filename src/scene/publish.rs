@@ -63,7 +63,7 @@ impl Core {
         self.counters.quiet = if quiet { self.counters.quiet + 1 } else { 0 };
         let steps = f64::from(QUIET_STEPS) * self.model.manifest.dt_s / self.step_s();
         self.counters.sleeping =
-            !self.options.no_sleep && f64::from(self.counters.quiet) >= steps - 1e-6;
+            self.options.sleep && f64::from(self.counters.quiet) >= steps - 1e-6;
         self.counters.rest_frames = 0;
         self.rotate(published);
     }

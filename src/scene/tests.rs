@@ -15,7 +15,7 @@ fn a_step_makes_no_invalid_operation() {
         let model = Model::open(&path, &ModelOptions::default()).unwrap();
         let options = SceneOptions {
             guard_policy: GuardPolicy::Report,
-            no_sleep: true,
+            sleep: false,
             ..SceneOptions::default()
         };
         let scene = Scene::new(Arc::clone(&model), &options).unwrap();

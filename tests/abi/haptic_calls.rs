@@ -24,7 +24,7 @@ impl World<'_> {
                     if tools.is_empty() {
                         options.tool = std::ptr::null();
                     }
-                    options.no_passivity = (call.seed >> 8) as u8 % 2;
+                    options.passivity = (call.seed >> 8) as u8 % 3;
                     let mut numbers = [(call.seed % 30) as f32, 0.0, 0.0, 0.0];
                     spoil(&mut numbers, call.odd, call.seed as usize);
                     [

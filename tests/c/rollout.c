@@ -29,7 +29,7 @@ int main(int argc, char **argv) {
   steps = atol(argv[2]);
   memset(&options, 0, sizeof options);
   options.struct_size = sizeof options;
-  options.no_sleep = 1;
+  options.sleep = UPT_SWITCH_OFF;
   options.guard_policy = UPT_GUARD_REPORT;
   options.corrections = argc > 4 ? atoi(argv[4]) : 0;
   memset(&info, 0, sizeof info);

@@ -61,9 +61,9 @@ void walk_model_open(const char *bundle, const char *damaged) {
   options.reserved = 1;
   EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
   options.reserved = 0;
-  options.no_fallback = 7;
+  options.fallback = 7;
   EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
-  options.no_fallback = 1;
+  options.fallback = UPT_SWITCH_OFF;
   options.provider_count = 1;
   EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_NULL);
   options.providers = &unknown;
@@ -94,7 +94,7 @@ void walk_model_open(const char *bundle, const char *damaged) {
   options.precision = UPT_PRECISION_F32;
   options.providers = &cuda;
   options.provider_count = 1;
-  options.no_fallback = 0;
+  options.fallback = UPT_SWITCH_DEFAULT;
   EXPECT(upt_model_open(bundle, &options, &model), UPT_OK);
   EXPECT(upt_model_close(model), UPT_OK);
   EXPECT(upt_model_open(bundle, NULL, &model), UPT_OK);

@@ -80,7 +80,7 @@ fn size(v: [f32; 3]) -> f32 {
 fn a_press_leaves_no_penetration_and_pushes_back_and_a_lift_ends_it() {
     for corrections in [0, 1, 3, 10] {
         let options = SceneOptions {
-            no_sleep: false,
+            sleep: true,
             ..with(corrections)
         };
         let scene = scene(&model("tiny-corrected"), &options);

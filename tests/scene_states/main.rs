@@ -20,7 +20,7 @@ const FREE: StepInput<'static> = StepInput {
 fn a_reduced_scene_falls_asleep_and_wakes_at_once() {
     let model = model("tiny-reduced");
     let options = SceneOptions {
-        no_sleep: false,
+        sleep: true,
         ..plain()
     };
     let scene = scene(&model, &options);

@@ -86,7 +86,7 @@ fn an_error_that_was_not_told_is_never_lost() {
     for latest_wins in [false, true] {
         let options = SceneOptions {
             latest_wins,
-            no_sleep: true,
+            sleep: false,
             ..SceneOptions::default()
         };
         let scene = scene(&model, &options);

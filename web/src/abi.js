@@ -47,6 +47,9 @@ export const UPT_STEP_WHOLE = 2;
 export const UPT_STEP_MEASURED = 3;
 export const UPT_CORRECTIONS_NONE = -1;
 export const UPT_CORRECTIONS_AUTO = -2;
+export const UPT_SWITCH_DEFAULT = 0;
+export const UPT_SWITCH_ON = 1;
+export const UPT_SWITCH_OFF = 2;
 export const UPT_GUARD_HOLD = 0;
 export const UPT_GUARD_REPORT = 1;
 export const UPT_GUARD_BLEND = 2;
@@ -106,7 +109,7 @@ export const upt_model_options = {
     cache_dir: ["Uint32", 40, 1],
     allow_tf32: ["Uint8", 44, 1],
     cuda_graph: ["Uint8", 45, 1],
-    no_fallback: ["Uint8", 46, 1],
+    fallback: ["Uint8", 46, 1],
     reserved: ["Uint8", 47, 1],
     user_stream: ["Uint32", 48, 1],
   },
@@ -141,7 +144,7 @@ export const upt_scene_options = {
     guard_policy: ["Int32", 16, 1],
     mesh_path: ["Uint32", 20, 1],
     free_boundary: ["Uint8", 24, 1],
-    no_sleep: ["Uint8", 25, 1],
+    sleep: ["Uint8", 25, 1],
     check_inversion: ["Uint8", 26, 1],
     latest_wins: ["Uint8", 27, 1],
     cubic_sampling: ["Uint8", 28, 1],
@@ -167,7 +170,7 @@ export const upt_haptics_options = {
     step_latency_ms: ["Float32", 16, 1],
     force_limit_n: ["Float32", 20, 1],
     damping_limit_n_s_per_m: ["Float32", 24, 1],
-    no_passivity: ["Uint8", 28, 1],
+    passivity: ["Uint8", 28, 1],
     reserved: ["Uint8", 29, 7],
   },
 };

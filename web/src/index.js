@@ -134,7 +134,7 @@ class Scene {
       corrections_budget_us: more.budgetUs ?? 0,
       error_limit_mm: more.errorLimitMm ?? 0,
       substeps: more.substeps ?? 0,
-      no_sleep: more.neverSleeps ? 1 : 0,
+      sleep: more.neverSleeps ? abi.UPT_SWITCH_OFF : 0,
     };
     this.#module = module;
     this.handle = module.withRoom(abi.upt_scene_options.size, (at) => {

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from enum import IntEnum, IntFlag
 from typing import Any, TypedDict
 
-from upt._record import Record, boolean, choice, numbers, text, vector
+from upt._record import Record, boolean, choice, numbers, switch, text, vector
 
 ";
 
@@ -136,6 +136,11 @@ fn seen(source: &Source, item: &Struct, field: &Named) -> Result<Seen> {
         // Microseconds may be mentioned next to an enum and are not part of it.
         Kind::Number(number) if number == "u32" && name.ends_with("_us") => of("int", "int", None),
         Kind::Number(number) => match named_enum(source, &field.doc) {
+            Some(class) if class == "Switch" => of(
+                "bool | None",
+                "bool | None",
+                Some(format!("switch(\"_{name}\")")),
+            ),
             Some(class) if matches!(number.as_str(), "u8" | "i32" | "u32") => of(
                 &class,
                 &format!("{class} | str | int"),

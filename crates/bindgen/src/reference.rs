@@ -30,7 +30,7 @@ const CHAPTERS: [(&str, &str); 14] = [
 ];
 
 /// Headings of the constants, by prefix.
-const FAMILIES: [(&str, &str); 15] = [
+const FAMILIES: [(&str, &str); 16] = [
     ("UPT_ABI_", "Version"),
     ("UPT_PROVIDER_", "Providers"),
     ("UPT_KIND_", "Model kinds"),
@@ -43,6 +43,7 @@ const FAMILIES: [(&str, &str); 15] = [
     ("UPT_FLAG_", "Flags of a step"),
     ("UPT_SET_", "Index sets"),
     ("UPT_VIEW_", "Views"),
+    ("UPT_SWITCH_", "Switches"),
     ("UPT_SHAPE_", "Instrument shapes"),
     ("UPT_MODE_", "Instrument modes"),
     ("UPT_END_", "Far ends of ties"),

@@ -126,7 +126,9 @@ impl Model {
             options.providers = providers.as_ptr();
             options.provider_count = 1;
             options.precision = settings.precision;
-            options.no_fallback = u8::from(settings.exact);
+            if settings.exact {
+                options.fallback = ffi::UPT_SWITCH_OFF as u8;
+            }
             let mut handle = std::ptr::null_mut();
             check(ffi::upt_model_open(text.as_ptr(), &options, &mut handle))?;
             let mut info: ffi::upt_model_info = zeroed();

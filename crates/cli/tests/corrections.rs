@@ -57,7 +57,7 @@ fn error(folder: &Path, corrections: Corrections) -> f64 {
     let model = Model::open(folder, &ModelOptions::default()).unwrap();
     let options = SceneOptions {
         corrections,
-        no_sleep: true,
+        sleep: false,
         ..SceneOptions::default()
     };
     let scene = Scene::new(model, &options).unwrap();

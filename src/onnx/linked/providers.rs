@@ -49,10 +49,9 @@ impl ProviderPlan {
             .iter()
             .map(|(provider, reason)| format!("{}: {reason}", provider.name()))
             .collect();
-        let note = if self.options.no_fallback {
-            " (no_fallback is set)"
-        } else {
-            ""
+        let note = match self.options.fallback {
+            true => "",
+            false => " (fallback is off)",
         };
         Err(of_onnx(
             format!("{}{note}", list.join("; ")),

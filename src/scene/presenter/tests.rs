@@ -22,7 +22,7 @@ impl Host {
     fn new(model: &Arc<Model>) -> Host {
         let options = SceneOptions {
             guard_policy: GuardPolicy::Report,
-            no_sleep: true,
+            sleep: false,
             corrections: Corrections::Fixed(8),
             ..SceneOptions::default()
         };

@@ -41,8 +41,8 @@ namespace Upt.Interop
         public byte allow_tf32;
         /// <summary>1: capture CUDA graphs.</summary>
         public byte cuda_graph;
-        /// <summary>1: fail with `UPT_ERR_PROVIDER` when the first provider cannot run the model.</summary>
-        public byte no_fallback;
+        /// <summary>`UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`.</summary>
+        public byte fallback;
         /// <summary>Zero.</summary>
         public byte reserved;
         /// <summary>A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.</summary>
@@ -106,8 +106,8 @@ namespace Upt.Interop
         public byte* mesh_path;
         /// <summary>1: do not enforce held and contact nodes.</summary>
         public byte free_boundary;
-        /// <summary>1: never sleep.</summary>
-        public byte no_sleep;
+        /// <summary>`UPT_SWITCH_*`: tissue at rest sleeps, usually on.</summary>
+        public byte sleep;
         /// <summary>1: the guard looks for inverted elements in each step.</summary>
         public byte check_inversion;
         /// <summary>1: a submit while a step is in flight replaces the waiting contact and does not return `UPT_ERR_BUSY`.</summary>
@@ -166,8 +166,8 @@ namespace Upt.Interop
         public float force_limit_n;
         /// <summary>The most that the passivity controller damps, N s/m; 0: 5.</summary>
         public float damping_limit_n_s_per_m;
-        /// <summary>1: no passivity observer and controller.</summary>
-        public byte no_passivity;
+        /// <summary>`UPT_SWITCH_*`: passivity observer and controller, usually on.</summary>
+        public byte passivity;
         /// <summary>Zero.</summary>
         public fixed byte reserved[7];
     }
@@ -701,6 +701,12 @@ namespace Upt.Interop
         public const int UPT_CORRECTIONS_NONE = -1;
         /// <summary>As many corrections as the scene's target needs and its budget allows.</summary>
         public const int UPT_CORRECTIONS_AUTO = -2;
+        /// <summary>A switch: as usual, which its field says.</summary>
+        public const int UPT_SWITCH_DEFAULT = 0;
+        /// <summary>A switch: on.</summary>
+        public const int UPT_SWITCH_ON = 1;
+        /// <summary>A switch: off.</summary>
+        public const int UPT_SWITCH_OFF = 2;
         /// <summary>
         /// Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
         /// under `UPT_GUARD_BLEND`.

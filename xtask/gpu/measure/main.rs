@@ -63,7 +63,7 @@ fn main() -> std::result::Result<(), Box<dyn std::error::Error>> {
 fn variants(provider: Provider) -> Vec<(&'static str, ModelOptions, StepPath)> {
     let plain = ModelOptions {
         providers: vec![provider],
-        no_fallback: true,
+        fallback: false,
         ..ModelOptions::default()
     };
     let (mut f16, mut graph, mut tf32) = (plain.clone(), plain.clone(), plain.clone());
@@ -127,7 +127,7 @@ impl Way {
             step_path: self.step_path,
             corrections: Corrections::None,
             guard_policy: GuardPolicy::Report,
-            no_sleep: true,
+            sleep: false,
             ..SceneOptions::default()
         };
         Scene::new(Arc::clone(&self.model), &options)
