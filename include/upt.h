@@ -342,8 +342,7 @@
 #define UPT_FLAG_DEEP 8192
 
 /**
- * The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings), or the whole step
- * of a tool that leapt more than 40 mm was.
+ * The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings).
  */
 #define UPT_FLAG_UNSOLVED 16384
 

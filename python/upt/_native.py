@@ -204,8 +204,7 @@ class Flag(IntFlag):
     DEEP = 8192
     """Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue."""
     UNSOLVED = 16384
-    """The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings), or the whole step
-    of a tool that leapt more than 40 mm was."""
+    """The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings)."""
 
 
 class IndexSet(IntEnum):

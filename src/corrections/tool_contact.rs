@@ -33,9 +33,6 @@ pub(super) const KEPT_MM: f32 = 0.5 * SUNK_MM;
 const FARTHEST_MM: f32 = 30.0;
 /// How often the contact on the linear response is solved again where the tissue has not come out of the tools.
 const MORE_PRESSES: u32 = 6;
-const MORE_AFTER_A_LEAP: u32 = 2;
-/// What such a press takes beside its solve, in multiplications.
-const PRESS_WORK: u64 = 8_000_000;
 
 /// Evaluations of the element forces that a step may take beyond [`EVALUATIONS`] for each of its iterations.
 const MORE_EVALUATIONS: u32 = 6;
@@ -221,8 +218,6 @@ impl ImplicitSolver {
         }
         let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
         let ways = problem.parts();
-        // A tool that leapt has no way to be taken in parts.
-        let most = if problem.has_leapt() { 1 } else { MOST_PARTS };
         let mut iterated = 1;
         loop {
             problem.restart();
@@ -255,7 +250,7 @@ impl ImplicitSolver {
             self.evaluate(context, input, at, report)?;
             report.parts = parts;
             if at.det > least
-                || iterated >= most
+                || iterated >= MOST_PARTS
                 || problem.work.is_spent()
                 || is_spent(input, problem, report, 1)
             {
@@ -283,15 +278,10 @@ impl ImplicitSolver {
         u: &mut [f32],
     ) -> Result<f32> {
         let mut left = lost_by(input, problem, u);
-        let most = match problem.has_leapt() {
-            true => MORE_AFTER_A_LEAP,
-            false => MORE_PRESSES,
-        };
-        for _ in 0..most {
+        for _ in 0..MORE_PRESSES {
             if left <= most_mm || left == f32::MAX || problem.work.is_spent() {
                 break;
             }
-            problem.work.charge(PRESS_WORK);
             self.preconditioner.coordinates.fill(0.0);
             self.press(context, input, problem, 1.0, u)?;
             self.settle(context.env(), u)?;

@@ -107,8 +107,7 @@ pub const UPT_FLAG_FELL_BACK: u32 = 2048;
 pub const UPT_FLAG_ERROR: u32 = 4096;
 /// Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.
 pub const UPT_FLAG_DEEP: u32 = 8192;
-/// The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings), or the whole step
-/// of a tool that leapt more than 40 mm was.
+/// The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings).
 pub const UPT_FLAG_UNSOLVED: u32 = 16384;
 
 /// Nodes of the surface.

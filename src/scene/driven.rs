@@ -275,7 +275,6 @@ impl Core {
         if readings
             .clone()
             .any(|reading| reading.residual_mm > UNSOLVED_MM)
-            || problem.work.is_cut_short()
         {
             stats.flags |= flag::UNSOLVED;
         }

@@ -66,7 +66,7 @@ impl Run {
 }
 
 pub(crate) fn names(flags: u32) -> String {
-    const NAMES: [(u32, &str); 14] = [
+    const NAMES: [(u32, &str); 15] = [
         (flag::PUSH, "push"),
         (flag::CONTACT_AREA, "area"),
         (flag::SITE, "site"),
@@ -81,6 +81,7 @@ pub(crate) fn names(flags: u32) -> String {
         (flag::FELL_BACK, "fell-back"),
         (flag::ERROR, "error"),
         (flag::DEEP, "deep"),
+        (flag::UNSOLVED, "unsolved"),
     ];
     let set: Vec<&str> = NAMES
         .iter()

@@ -211,7 +211,7 @@ impl ContactProblem {
         self.unsolved_mm = 0.0;
         self.lay_in_tissue = false;
         self.enter(tools, ties, rest, start)?;
-        self.work = Work::of(self.may_lose(), self.has_leapt, self.tied.work());
+        self.work = Work::of(self.may_lose(), self.tied.work());
         Ok(())
     }
 

@@ -1,4 +1,4 @@
-//! What a step may cost: the multiplications and the time that are left to its contact solves, and those that are left to the whole of it.
+//! What a step may cost: the multiplications and the time that are left to its contact solves.
 //!
 //! Work is counted and not timed, so that a step has the same bits on every machine; only a host's budget is a time.
 //!
@@ -15,16 +15,11 @@ const SOLVES_WORK: u64 = 20_000_000;
 const LONGEST_SOLVES_WORK: u64 = 3 * SOLVES_WORK;
 /// What is left when solves begin to take fewer samples.
 const SHORT_OF_WORK: u64 = SOLVES_WORK / 2;
-/// Work of a whole step at most, its iterations included, in which a tool leaps: about fifteen milliseconds.
-const LEAP_WORK: u64 = 60_000_000;
 
 /// What is left to the step being made.
 #[derive(Debug, HeldBytes)]
 pub struct Work {
     solves: u64,
-    step: u64,
-    /// The whole step's work is bounded.
-    is_bounded: bool,
     /// When the step's budget of time ends.
     until: Option<Instant>,
 }
@@ -34,25 +29,18 @@ impl Work {
     pub fn new() -> Work {
         Work {
             solves: SOLVES_WORK,
-            step: u64::MAX,
-            is_bounded: false,
             until: None,
         }
     }
 
-    /// Of a step whose tools may lose their contact, or leap; `more` for ties.
-    pub fn of(may_lose: bool, is_bounded: bool, more: u64) -> Work {
+    /// Of a step whose tools may lose their contact; `more` for ties.
+    pub fn of(may_lose: bool, more: u64) -> Work {
         let solves = match may_lose {
             true => SOLVES_WORK,
             false => LONGEST_SOLVES_WORK,
         };
         Work {
             solves: solves + more,
-            step: match is_bounded {
-                true => LEAP_WORK + more,
-                false => u64::MAX,
-            },
-            is_bounded,
             until: None,
         }
     }
@@ -60,7 +48,6 @@ impl Work {
     /// Takes off what a solve has cost.
     pub fn take(&mut self, work: u64) {
         self.solves = self.solves.saturating_sub(work);
-        self.step = self.step.saturating_sub(work);
     }
 
     /// A solve begins: whether it is short of work.
@@ -85,56 +72,9 @@ impl Work {
         self.until = until;
     }
 
-    /// Whether the solves of this step have taken their work or time, or the whole of it has.
+    /// Whether the solves of this step have taken their work or time.
     pub fn is_spent(&self) -> bool {
         let is_late = || self.until.is_some_and(|until| Instant::now() >= until);
-        self.solves == 0 || self.step == 0 || is_late()
-    }
-
-    /// Whether a step whose whole work is bounded has taken its work or time, so that nothing more is to be tried.
-    pub fn is_over(&self) -> bool {
-        self.is_bounded && self.is_spent()
-    }
-
-    /// Takes what iterations have cost off the work of the whole step, in multiplications.
-    pub fn charge(&mut self, work: u64) {
-        self.step = self.step.saturating_sub(work);
-    }
-
-    /// Whether the whole step has so much work left; where it has not, it is cut short.
-    pub fn affords(&mut self, work: u64) -> bool {
-        let has = self.step >= work;
-        if !has {
-            self.step = 0;
-        }
-        has
-    }
-
-    /// Whether the whole step's work is done, and what it left out is to be told.
-    pub fn is_cut_short(&self) -> bool {
-        self.step == 0
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_a_leap_cannot_afford_is_told() {
-        let mut work = Work::of(true, true, 0);
-        assert!(work.affords(LEAP_WORK) && !work.is_cut_short());
-        assert!(!work.affords(LEAP_WORK + 1));
-        assert!(work.is_cut_short() && work.is_spent() && work.is_over());
-    }
-
-    #[test]
-    fn a_step_without_a_leap_is_not_bounded_as_a_whole() {
-        let mut work = Work::of(true, false, 0);
-        work.charge(u64::MAX / 2);
-        assert!(work.affords(LEAP_WORK) && !work.is_spent());
-        // Its solves are, and then nothing is cut short that a reading does not tell.
-        work.take(SOLVES_WORK);
-        assert!(work.is_spent() && !work.is_over() && !work.is_cut_short());
+        self.solves == 0 || is_late()
     }
 }

@@ -89,11 +89,6 @@ impl Tangent for Response<'_> {
 }
 
 impl NearColumns {
-    /// How many are known.
-    pub fn count(&self) -> usize {
-        self.columns.len()
-    }
-
     fn clear(&mut self) {
         self.columns.clear();
         self.moved.clear();

@@ -13,11 +13,6 @@ use crate::corrections::tool_contact::SUNK_MM;
 use crate::error::Result;
 use crate::memory;
 
-/// What an iteration and one evaluation of it take by the near node, and the columns of a touched one, in multiplications.
-const ITERATION_WORK: u64 = 3000;
-const EVALUATION_WORK: u64 = 3000;
-const COLUMN_WORK: u64 = 250_000;
-
 impl LocalSolver {
     /// One iteration with the tools at part `way` of their way.
     pub(in crate::corrections) fn improve(
@@ -30,13 +25,8 @@ impl LocalSolver {
     ) -> Result<Gain> {
         let _span = tracing::trace_span!("iteration").entered();
         let env = step.context.env();
-        let known = self.columns.count();
         self.descend(step, problem)?;
         self.solve_contact(step, problem, base, way)?;
-        let made = self.columns.count().saturating_sub(known) as u64;
-        problem
-            .work
-            .charge(ITERATION_WORK * self.near.nodes.len() as u64 + COLUMN_WORK * made);
         let stiff = &mut self.d_stiff;
         step.preconditioner.stiffen(env, &self.d.c, stiff)?;
         self.near.linear(env, &self.d_modes, &mut self.d_linear);
@@ -47,9 +37,6 @@ impl LocalSolver {
         for attempt in 0..=SHORTENINGS {
             self.place_at(base, t);
             let det = self.evaluate(step, t)?;
-            problem
-                .work
-                .charge(EVALUATION_WORK * self.near.nodes.len() as u64);
             let slope_new = self.next.over(&self.d) - work;
             let sunk_mm = match det > SMALLEST_DET {
                 true => sunk(problem, &self.trial),

@@ -49,9 +49,6 @@ pub use self::record::Record;
 /// Far elements of a chunk that is near in part are looked at where its smallest det F is below this.
 const LOOKED_AT_DET: f32 = 0.5;
 
-/// What the beginning of a round takes by the near node, its near set and factor being new, in multiplications.
-const BEGIN_WORK: u64 = 25_000;
-
 /// What a solver lends to the iterations of a step.
 pub(super) struct StepContext<'a> {
     pub context: SolverContext<'a>,
@@ -197,11 +194,6 @@ impl LocalSolver {
             None => memory::boxed(LocalSolver::new(context)?, WHAT)?,
         };
         Ok(slot.insert(local))
-    }
-
-    /// Multiplications that the beginning of a round has taken.
-    pub(super) fn begin_work(&self) -> u64 {
-        BEGIN_WORK * self.near.nodes.len() as u64
     }
 
     /// Starts from `base`, with `touched` nodes.

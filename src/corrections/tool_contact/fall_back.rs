@@ -23,7 +23,7 @@ impl ImplicitSolver {
         at.u.copy_from_slice(&self.guess);
         let mut left = self.press_on(context, input, problem, SUNK_MM, at.u)?;
         self.keep(problem, at)?;
-        if left > SUNK_MM && !problem.work.is_over() {
+        if left > SUNK_MM {
             self.respond_from_rest(context, input, problem, at, report)?;
             let from_rest = self.press_on(context, input, problem, SUNK_MM, at.u)?;
             if from_rest < left {

@@ -53,9 +53,7 @@ impl ImplicitSolver {
             self.improve_round(context, input, problem, at, (&mut made, report))?;
             self.end_round(context, input, problem, at)?;
             let most = input.enough.iterations;
-            let again = self.local.as_ref().map_or(0, |local| local.begin_work());
-            let is_done = made.is_enough || made.iterations >= most || problem.work.is_spent();
-            if is_done || !problem.work.affords(again) {
+            if made.is_enough || made.iterations >= most || problem.work.is_spent() {
                 break;
             }
             self.evaluate(context, input, at, report)?;
@@ -140,12 +138,7 @@ impl ImplicitSolver {
             u: at.u,
             residual: at.g,
         };
-        let generation = local.factor.generation;
-        let begun = local.begin(&mut step, base);
-        if local.factor.generation != generation {
-            problem.work.charge(local.begin_work());
-        }
-        begun
+        local.begin(&mut step, base)
     }
 
     /// The state of the iterations into `at`, whose residual is not known then.

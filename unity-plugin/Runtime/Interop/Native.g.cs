@@ -747,10 +747,7 @@ namespace Upt.Interop
         public const uint UPT_FLAG_ERROR = 4096;
         /// <summary>Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.</summary>
         public const uint UPT_FLAG_DEEP = 8192;
-        /// <summary>
-        /// The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings), or the whole step
-        /// of a tool that leapt more than 40 mm was.
-        /// </summary>
+        /// <summary>The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings).</summary>
         public const uint UPT_FLAG_UNSOLVED = 16384;
         /// <summary>Nodes of the surface.</summary>
         public const int UPT_SET_SURFACE_NODES = 0;
