@@ -16,6 +16,7 @@ mod diagnosis;
 mod error;
 mod fields;
 mod frame;
+mod groups;
 mod loading;
 mod march;
 mod mass;

@@ -10,6 +10,7 @@ mod dataset;
 mod determinism;
 mod dynamics;
 mod failures;
+mod groups;
 mod metrics;
 mod stiffness;
 mod ties;
