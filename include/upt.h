@@ -858,6 +858,44 @@ typedef struct upt_tie {
 } upt_tie;
 
 /**
+ * What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_support` names the groups.
+ */
+typedef struct upt_support {
+  /**
+   * `sizeof(upt_support)`, the same in every element of an array.
+   */
+  uint32_t struct_size;
+  /**
+   * Its place among the bundle's groups, from 0.
+   */
+  uint32_t group;
+  /**
+   * As a rigid body in the mesh's frame: a node `x` of the group ends at `R x + position`, mm; at most 40 mm from where it is.
+   */
+  float position[3];
+  /**
+   * `R` as a unit quaternion x, y, z, w; all zero: none.
+   */
+  float rotation[4];
+  /**
+   * 1: the group holds nothing, and its nodes move as all free ones do. Held again, it holds them where they are then. 0: it holds.
+   */
+  uint8_t let_go;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[3];
+  /**
+   * `[n,3]`, mm, instead of a pose: the displacement of each of the group's nodes at the end of the step; NULL: the pose.
+   */
+  const float *displacements;
+  /**
+   * 3 n, or 0.
+   */
+  uint64_t displacement_count;
+} upt_support;
+
+/**
  * The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
  * by itself.
  *
@@ -929,6 +967,15 @@ typedef struct upt_input {
    * At most 256.
    */
   uint64_t tie_count;
+  /**
+   * `[support_count]`: what support groups of the bundle do, each at most once, all with the same `struct_size`. A group that is not named is held where it was
+   * meshed, or where it was held again. Pass them in every step.
+   */
+  const struct upt_support *supports;
+  /**
+   * At most 64.
+   */
+  uint64_t support_count;
   /**
    * Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.
    */
@@ -1644,6 +1691,26 @@ upt_status upt_model_indices(const struct upt_model *model,
                              int32_t set,
                              uint32_t *out,
                              uint64_t capacity,
+                             uint64_t *needed);
+
+/**
+ * Names a support group of a bundle, and copies its nodes: what `upt_input.supports` moves.
+ *
+ * - `group`: from 0; the groups end where this is `UPT_ERR_ARGUMENT` (`upt_model_describe` lists them).
+ * - `name`: receives text with its NUL; NULL with capacity 0 leaves it out.
+ * - `nodes`: node indices, ascending; NULL with capacity 0 only queries the size.
+ * - `node_capacity`: number of indices that fit in `nodes`.
+ * - `needed`: number of nodes of the group, always written; may be NULL.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such group, a capacity too small).
+ */
+upt_status upt_model_support(const struct upt_model *model,
+                             uint32_t group,
+                             char *name,
+                             uint64_t name_capacity,
+                             uint32_t *nodes,
+                             uint64_t node_capacity,
                              uint64_t *needed);
 
 /**

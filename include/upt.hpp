@@ -214,6 +214,12 @@ public:
     raw_.tie_count = ties.size();
     return *this;
   }
+  /// What support groups of the bundle do, in every step; struct_size is set in each.
+  Input &supports(span<const upt_support> supports) noexcept {
+    raw_.supports = supports.data();
+    raw_.support_count = supports.size();
+    return *this;
+  }
   const upt_input *get() const noexcept { return &raw_; }
   /// Whether the spans' sizes agree; a call that takes an input that does not fit refuses it.
   bool fits() const noexcept { return fits_; }

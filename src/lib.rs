@@ -99,7 +99,7 @@ pub use options::{
     Precision, Provider, SHORTEST_STEP_S, SceneOptions, StepPath, UserStream,
 };
 pub use scene::{
-    Bed, Blade, Contact, Cut, CutSurface, Loads, MAX_PRESSURES, Pressure, Progress, Scene,
-    StepInput, SupportPose, SurfaceUpdate, View,
+    Bed, Blade, Contact, Cut, CutSurface, GroupMotion, Loads, MAX_PRESSURES, MAX_SUPPORTS,
+    Pressure, Progress, Scene, StepInput, SupportPose, SurfaceUpdate, View,
 };
 pub use stats::{SceneStats, flag};

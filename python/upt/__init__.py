@@ -58,7 +58,7 @@ from upt.errors import (
 )
 from upt.haptics import Haptics
 from upt.instrument import Hull, Instrument
-from upt.loads import Loads
+from upt.loads import Loads, Support
 from upt.log import set_log
 from upt.model import Model
 from upt.scene import Scene
@@ -120,6 +120,7 @@ __all__ = [
     "Status",
     "StepPath",
     "Surface",
+    "Support",
     "Tie",
     "TieReading",
     "UnsupportedError",

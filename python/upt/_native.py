@@ -832,6 +832,11 @@ class Input(Record):
     every time, in the same order. A broken one stays broken in its place until it has a stiffness of 0 there, the array ends before it, or the scene is reset."""
     tie_count: int
     """At most 256."""
+    supports: int | None
+    """`[support_count]`: what support groups of the bundle do, each at most once, all with the same `struct_size`. A group that is not named is held where it was
+    meshed, or where it was held again. Pass them in every step."""
+    support_count: int
+    """At most 64."""
     gravity: tuple[float, ...] = vector("_gravity")
     """Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction."""
     gravity_at_rest: tuple[float, ...] = vector("_gravity_at_rest")
@@ -861,6 +866,8 @@ class Input(Record):
         ("pressure_count", ctypes.c_uint64),
         ("ties", ctypes.c_void_p),
         ("tie_count", ctypes.c_uint64),
+        ("supports", ctypes.c_void_p),
+        ("support_count", ctypes.c_uint64),
         ("_gravity", ctypes.c_float * 3),
         ("_gravity_at_rest", ctypes.c_float * 3),
         ("_support_position", ctypes.c_float * 3),
@@ -1202,6 +1209,38 @@ class Surface(Record):
     ]
 
 
+class Support(Record):
+    """What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_support` names the groups."""
+
+    struct_size: int
+    """`sizeof(upt_support)`, the same in every element of an array."""
+    group: int
+    """Its place among the bundle's groups, from 0."""
+    position: tuple[float, ...] = vector("_position")
+    """As a rigid body in the mesh's frame: a node `x` of the group ends at `R x + position`, mm; at most 40 mm from where it is."""
+    rotation: tuple[float, ...] = vector("_rotation")
+    """`R` as a unit quaternion x, y, z, w; all zero: none."""
+    let_go: bool = boolean("_let_go")
+    """1: the group holds nothing, and its nodes move as all free ones do. Held again, it holds them where they are then. 0: it holds."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    displacements: int | None
+    """`[n,3]`, mm, instead of a pose: the displacement of each of the group's nodes at the end of the step; NULL: the pose."""
+    displacement_count: int
+    """3 n, or 0."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("group", ctypes.c_uint32),
+        ("_position", ctypes.c_float * 3),
+        ("_rotation", ctypes.c_float * 4),
+        ("_let_go", ctypes.c_uint8),
+        ("_reserved", ctypes.c_uint8 * 3),
+        ("displacements", ctypes.c_void_p),
+        ("displacement_count", ctypes.c_uint64),
+    ]
+
+
 #: Name: (result, parameters).
 FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_init": (ctypes.c_int32, [ctypes.c_void_p]),
@@ -1218,6 +1257,7 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_model_describe": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_model_positions": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_model_indices": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_int32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_model_support": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_reset": (ctypes.c_int32, [ctypes.c_void_p]),

@@ -14,9 +14,39 @@ from upt import _native
 from upt._arrays import address, number, vectors
 from upt.ties import Tie
 
-#: The end of `upt_input`: forces, pressures and ties, how many of each, gravity and that at rest, the support's pose.
-_LAYOUT = Struct("@PPQPQ13f")
+#: The end of `upt_input`: forces, pressures, ties and supports, how many of each, gravity and that at rest, the pose.
+_LAYOUT = Struct("@PPQPQPQ13f")
 OFFSET: int = _native.Input.forces.offset  # type: ignore[union-attr]
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """What a support group of the bundle does at the end of a step, an element of `Loads.supports`."""
+
+    group: int
+    """Its place among `Model.supports`."""
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """As a rigid body in the mesh's frame: a node `x` of the group ends at `R x + position`, mm."""
+    rotation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
+    """`R` as a unit quaternion x, y, z, w."""
+    let_go: bool = False
+    """It holds nothing. Held again, it holds its nodes where they are then."""
+    displacements: ArrayLike | None = None
+    """Instead of a pose: `[n, 3]`, mm, of each of its nodes."""
+
+    def record(self, name: str) -> tuple[_native.Support, object]:
+        """The struct, and what must live with it."""
+        own = None if self.displacements is None else np.ascontiguousarray(self.displacements, np.float32)
+        record = _native.Support(
+            group=self.group,
+            position=tuple(number(value, f"{name}.position") for value in self.position),
+            rotation=tuple(number(value, f"{name}.rotation") for value in self.rotation),
+            let_go=int(self.let_go),
+        )
+        if own is not None:
+            record.position, record.rotation = (0.0,) * 3, (0.0,) * 4
+            record.displacements, record.displacement_count = address(own), own.size
+        return record, own
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +76,9 @@ class Loads:
     ties: Sequence[Tie] = ()
     """Ties of the tissue, at most 256, beside instruments or alone; in every step, in the same order."""
 
+    supports: Sequence[Support] = ()
+    """What support groups of the bundle do, in every step; one that is not named is held."""
+
     def pack_into(self, memory: bytearray, node_count: int) -> object:
         """Puts these loads into a `upt_input`; gives what must live over the call."""
         forces = None if self.forces is None else vectors(self.forces, "forces", node_count)
@@ -64,7 +97,11 @@ class Loads:
         gravity += [number(value, "support") for value in (*position, *rotation)]
         ties = [tie.record(f"ties[{index}]") for index, tie in enumerate(self.ties)]
         tied = (_native.Tie * len(ties))(*ties)
+        groups = [support.record(f"supports[{index}]") for index, support in enumerate(self.supports)]
+        led = (_native.Support * len(groups))(*(record for record, _ in groups))
+        led_at = addressof(led) if groups else 0
         at, tied_at = addressof(array) if records else 0, addressof(tied) if ties else 0
         pushed = 0 if forces is None else address(forces)
-        _LAYOUT.pack_into(memory, OFFSET, pushed, at, len(records), tied_at, len(ties), *gravity)
-        return forces, regions, array, tied
+        counted = (pushed, at, len(records), tied_at, len(ties), led_at, len(groups))
+        _LAYOUT.pack_into(memory, OFFSET, *counted, *gravity)
+        return forces, regions, array, tied, groups, led

@@ -98,6 +98,16 @@ class Model:
         return out
 
     @cached_property
+    def supports(self) -> dict[str, Indices]:
+        """The bundle's support groups, in order: by name their nodes, `[n]` uint32; `Loads.supports` moves them."""
+        found: dict[str, Indices] = {}
+        for group, entry in enumerate(self.describe()["supports"]):
+            out = np.empty(entry["nodes"], np.uint32)
+            check(lib.upt_model_support(self._handle, group, None, 0, address(out), out.size, None))
+            found[entry["name"]] = out
+        return found
+
+    @cached_property
     def surface_nodes(self) -> Indices:
         """Nodes of the surface, `[n]` uint32."""
         return self.indices(IndexSet.SURFACE_NODES)

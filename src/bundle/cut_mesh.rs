@@ -73,6 +73,7 @@ impl Mesh {
             domain_faces,
             surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
             held_nodes: unique(held_nodes),
+            supports: Vec::new(),
             node_area,
             sha256: self.sha256.clone(),
             domain_sides: OnceLock::new(),

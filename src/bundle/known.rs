@@ -40,6 +40,7 @@ const KEYS: &[(&str, &[&str])] = &[
             "envelope",
             "precisions",
             "prior",
+            "supports",
             "corrections",
             "upt",
             "reduced",

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
+use crate::memory::HeldBytes;
+
 /// The kinds a manifest may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -22,6 +24,16 @@ pub enum Boundary {
     Fixed,
     /// The mesh's `fixed` and `supported`.
     Supported,
+}
+
+/// Held nodes that move as one, apart from the others.
+#[derive(Debug, Clone, Deserialize, HeldBytes)]
+pub struct SupportSet {
+    /// Its name.
+    #[held(skip)]
+    pub name: String,
+    /// Held nodes, ascending; none of another group's.
+    pub nodes: Vec<u32>,
 }
 
 /// Which mesh the bundle is for.
@@ -324,6 +336,9 @@ pub struct Manifest {
     pub rest_displacement_mm: f32,
     /// Linear response.
     pub prior: Option<PriorEntry>,
+    /// Support groups.
+    #[serde(default)]
+    pub supports: Vec<SupportSet>,
     /// Corrections by the elements.
     pub corrections: Option<CorrectionsEntry>,
     /// Kind `upt`.

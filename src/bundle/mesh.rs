@@ -5,13 +5,15 @@ use std::sync::OnceLock;
 use sha2::{Digest, Sha256};
 
 use super::files::hex;
-use super::manifest::Boundary;
+use super::manifest::{Boundary, SupportSet};
 use super::tensors::TensorFile;
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
 use safetensors::Dtype;
 
 const WHAT: &str = "a mesh";
+/// Support groups at most.
+const MOST_SUPPORTS: usize = 64;
 
 /// A checked mesh; lengths in mm.
 #[derive(Debug, HeldBytes)]
@@ -32,6 +34,8 @@ pub struct Mesh {
     pub domain_nodes: Vec<u32>,
     /// Nodes held at zero, ascending.
     pub held_nodes: Vec<u32>,
+    /// Parts of them that move apart from the others.
+    pub supports: Vec<SupportSet>,
     /// A third of the area of each node's boundary triangles `[K]`, mm^2.
     pub node_area: Vec<f32>,
     /// The mesh hash of `docs/reference/formats.md`.
@@ -128,7 +132,49 @@ impl Mesh {
             domain_faces,
             sha256: hex(&hash.finalize()),
             domain_sides: OnceLock::new(),
+            supports: Vec::new(),
         })
+    }
+
+    /// Takes the support groups of the bundle that it is of.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] with the group.
+    pub fn take_supports(&mut self, groups: &[SupportSet]) -> Result<()> {
+        let bad = |index: usize, problem: String| {
+            Err(Error::bundle(
+                "bundle.json",
+                format!("field `supports[{index}]` {problem}"),
+            ))
+        };
+        if groups.len() > MOST_SUPPORTS {
+            return bad(MOST_SUPPORTS, format!("is one more than {MOST_SUPPORTS}"));
+        }
+        for (index, group) in groups.iter().enumerate() {
+            let others = &groups[..index];
+            if group.name.is_empty() || others.iter().any(|other| other.name == group.name) {
+                return bad(
+                    index,
+                    format!("has the name `{}`, must have one of its own", group.name),
+                );
+            }
+            if group.nodes.is_empty() || !group.nodes.is_sorted_by(|a, b| a < b) {
+                return bad(index, "must have nodes, ascending".into());
+            }
+            for node in &group.nodes {
+                if self.held_nodes.binary_search(node).is_err() {
+                    return bad(index, format!("has node {node}, which is not held"));
+                }
+                if others
+                    .iter()
+                    .any(|other| other.nodes.binary_search(node).is_ok())
+                {
+                    return bad(index, format!("has node {node}, which another group has"));
+                }
+            }
+        }
+        self.supports = memory::collected(groups.len(), groups.iter().cloned(), WHAT)?;
+        Ok(())
     }
 
     /// Number of nodes, `K`.

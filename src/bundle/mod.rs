@@ -20,7 +20,7 @@ pub(crate) use files::hex;
 pub use manifest::{
     Base, Bound, Boundary, Coordinates, CorrectionsEntry, Dims, Envelope, Fade, Feature, FileEntry,
     Graph, Manifest, ManifestKind, MeshEntry, Normalisation, PriorEntry, ReducedEntry,
-    ReducedInput, ToolEnvelope, UptEntry,
+    ReducedInput, SupportSet, ToolEnvelope, UptEntry,
 };
 pub use mesh::Mesh;
 pub(crate) use mesh::volume;

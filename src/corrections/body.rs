@@ -2,6 +2,7 @@
 
 use elements::{ElementForces, Material, Tetrahedra};
 
+use super::boundary::Held;
 use super::time_step::Diagonal;
 use crate::bundle::Mesh;
 use crate::error::Result;
@@ -19,10 +20,8 @@ pub struct Body {
     pub mass: Vec<f32>,
     /// The same by degree of freedom `[3K]`.
     pub mass_of_dof: Vec<f32>,
-    /// Held nodes `[K]`.
-    pub held: Vec<bool>,
-    /// The same as a list, ascending.
-    pub held_nodes: Vec<u32>,
+    /// Held nodes, at rest.
+    pub held: Held,
 }
 
 impl Body {
@@ -46,20 +45,14 @@ impl Body {
     /// [`crate::Error::OutOfMemory`].
     pub(super) fn of(mesh: &Mesh, diagonal: &Diagonal, forces: ElementForces) -> Result<Body> {
         let count = mesh.node_count();
-        let mut held = memory::filled(count, false, WHAT)?;
-        for &node in &mesh.held_nodes {
-            held[node as usize] = true;
-        }
         let mass = diagonal.mass.iter().map(|mass| *mass as f32);
         let mass = memory::collected(count, mass, WHAT)?;
-        let ascending = (0..count as u32).filter(|node| held[*node as usize]);
         let of_dof = mass.iter().flat_map(|&mass| [mass; 3]);
         Ok(Body {
-            held_nodes: memory::collected(mesh.held_nodes.len(), ascending, WHAT)?,
             mass_of_dof: memory::collected(3 * count, of_dof, WHAT)?,
+            held: Held::new(count, mesh.held_nodes.iter().copied())?,
             forces,
             mass,
-            held,
         })
     }
 }

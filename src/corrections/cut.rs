@@ -60,6 +60,7 @@ impl Corrections {
             body: own,
             time_step: Arc::new(self.time_step.cut(&diagonal, &touched)?),
             changed,
+            groups: Vec::new(),
             gravity: OnceLock::new(),
             diagonal: OnceLock::from(diagonal),
             whole: OnceLock::new(),
@@ -106,7 +107,7 @@ impl Corrections {
         Some(Lost {
             element,
             corners,
-            is_free: corners.map(|node| !self.body.held[node as usize]),
+            is_free: corners.map(|node| !self.body.held.is[node as usize]),
             volume: lost.volume,
             gradients: lost.gradients,
             stiffness: lost.steady_stiffness(&lost.deformation([[0.0; 3]; 4]), moduli),

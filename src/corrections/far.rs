@@ -131,7 +131,7 @@ impl FarField {
             }
             // Inside of the chunk the shares of a node's elements cancel.
             let matters = sum.iter().any(|value| value.abs() > 1e-5 * largest);
-            if matters && !body.held[node as usize] {
+            if matters && !body.held.is[node as usize] {
                 self.nodes.push(node);
                 self.weights.push(sum.map(|value| value as f32));
             }

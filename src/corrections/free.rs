@@ -33,17 +33,23 @@ impl ImplicitSolver {
         let _awake = context.pool.keep_awake();
         self.nodes.clear();
         self.preconditioner.prescribe(context.env(), &[])?;
-        (self.preconditioner).expect_load(context.env(), input.load.is_some())?;
+        self.expect(context, input)?;
         self.memory.mask(&[]);
         self.prepare(context, input)?;
         let mut u = std::mem::take(&mut self.u);
         let mut g = std::mem::take(&mut self.g);
-        let result = self
-            .swing_from(context, input, &mut u, &mut g, &mut report)
-            .and_then(|()| self.finish(context, input, &u));
+        // A body of which a part has been let go has other natural modes.
+        let swings = context.held.let_go == 0;
+        let result = match swings {
+            true => self.swing_from(context, input, &mut u, &mut g, &mut report),
+            false => self.balance_from(context, input, &mut u, &mut g, &mut report),
+        };
+        let result = result.and_then(|()| self.finish(context, input, &u));
         if result.is_ok() {
             next.copy_from_slice(&u);
-            self.finish_free(context, input.last, next);
+            if swings {
+                self.finish_free(context, input.last, next);
+            }
             if report.fell_back {
                 self.stop_next();
                 self.leave_load();
@@ -94,7 +100,7 @@ impl ImplicitSolver {
             .of_natural(env, &self.free.values, &mut self.d)?;
         passes::shorten(env, input.last, &self.d, 1.0, u)?;
         self.add_gravity(context, input, u)?;
-        mask_held(&env.body.held, u);
+        self.lift(context, input, Some(input.last), u)?;
         let lost = det.is_nan() || det < SMALLEST_DET;
         let mut det = self.residual(context, [input.last, u, u], g, report)?.0;
         if !lost && (det.is_nan() || det < SMALLEST_DET) {
@@ -103,10 +109,49 @@ impl ImplicitSolver {
         }
         report.parts = 1;
         self.relax(context, input, det, u, g, report)?;
+        self.die_away(context, input, u, g, report)
+    }
+
+    /// BDF2 alone, from the free motion of the natural modes.
+    fn balance_from(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        u: &mut [f32],
+        g: &mut [f32],
+        report: &mut Report,
+    ) -> Result<()> {
+        let env = context.env();
+        u.copy_from_slice(input.last);
+        self.add_gravity(context, input, u)?;
+        self.lift(context, input, Some(input.last), u)?;
+        self.move_freely(env)?;
+        self.settle(env, u)?;
+        let mut det = self.residual(context, [input.last, u, u], g, report)?.0;
+        if det.is_nan() || det < SMALLEST_DET {
+            u.copy_from_slice(input.last);
+            det = self.residual(context, [input.last, u, u], g, report)?.0;
+        }
+        report.parts = 1;
+        self.relax(context, input, det, u, g, report)?;
+        self.die_away(context, input, u, g, report)
+    }
+
+    /// What takes the place of a free step whose iterations ended inverted. Without contact that was rest: the field dies away instead of a jump there,
+    /// and stays where a support has taken it.
+    fn die_away(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        u: &mut [f32],
+        g: &mut [f32],
+        report: &mut Report,
+    ) -> Result<()> {
         if report.fell_back {
-            // Without contact that was rest. The field dies away instead of a jump there.
+            let stays = context.held.let_go != 0 || !context.held.places.is_empty();
+            let kept = if stays { 1.0 } else { KEPT };
             for (u, last) in u.iter_mut().zip(input.last) {
-                *u = KEPT * last;
+                *u = kept * last;
             }
             report.min_det = self.residual(context, [input.last, u, u], g, report)?.0;
             self.stand();
@@ -122,7 +167,7 @@ impl ImplicitSolver {
             for (i, (q, value)) in solver.q.iter_mut().zip(field).enumerate() {
                 *q = scale * env.body.mass[i / 3] * value;
             }
-            mask_held(&env.body.held, &mut solver.q);
+            mask_held(&env.held.is, &mut solver.q);
             let (preconditioner, values) = (&mut solver.preconditioner, &mut solver.free.values);
             preconditioner.on_natural(env, &solver.q, values)
         };
@@ -137,7 +182,7 @@ impl ImplicitSolver {
         self.free.take(|mode| &mut mode.velocity);
         // The drift has the masses in it.
         self.q.copy_from_slice(&self.drift);
-        mask_held(&env.body.held, &mut self.q);
+        mask_held(&env.held.is, &mut self.q);
         let values = &mut self.free.values;
         self.preconditioner.on_natural(env, &self.q, values)?;
         self.free.take(|mode| &mut mode.drift);
@@ -149,7 +194,7 @@ impl ImplicitSolver {
             mode.load = 0.0;
         }
         if self.mean_load(input) {
-            mask_held(&env.body.held, &mut self.q);
+            mask_held(&env.held.is, &mut self.q);
             let values = &mut self.free.values;
             self.preconditioner.on_natural(env, &self.q, values)?;
             self.free.take(|mode| &mut mode.load);

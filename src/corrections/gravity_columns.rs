@@ -26,6 +26,7 @@ impl GravityResponse {
     fn new(context: SolverContext<'_>) -> Result<GravityResponse> {
         let context = SolverContext {
             time_step: &context.corrections.time_step,
+            held: &context.corrections.body.held,
             ..context
         };
         let env = context.env();
@@ -65,12 +66,12 @@ impl GravityResponse {
             let (det, _) = solver.residual(context, [&zero, &u, &u], &mut g, &mut report)?;
             let drift = std::mem::take(&mut solver.drift);
             g.copy_from_slice(&drift);
-            mask_held(&env.body.held, &mut g);
+            mask_held(&env.held.is, &mut g);
             solver.preconditioner.move_natural(env, &g)?;
             solver.drift = drift;
             let mut by_modes = memory::zeros(len, WHAT)?;
             solver.preconditioner.decode(env, &mut by_modes)?;
-            mask_held(&env.body.held, &mut by_modes);
+            mask_held(&env.held.is, &mut by_modes);
             solver.relax(context, &input, det, &mut u, &mut g, &mut report)?;
             for (u, by_modes) in u.iter_mut().zip(&by_modes) {
                 *u = (*u - by_modes) / TRIAL;
@@ -107,7 +108,7 @@ impl ImplicitSolver {
                 u.iter_mut().zip(from).for_each(|(u, w)| *u += change * w);
             }
         }
-        mask_held(&context.corrections.body.held, u);
+        context.held.put(u);
         Ok(())
     }
 }

@@ -3,6 +3,8 @@
 use crate::clock::Instant;
 
 use super::Corrections;
+use super::boundary::Held;
+use super::group::Group;
 use super::load::Load;
 use super::precondition::Env;
 use super::time_step::TimeStep;
@@ -86,9 +88,18 @@ pub struct SolverContext<'a> {
     pub corrections: &'a Corrections,
     /// The length of the scene's steps.
     pub time_step: &'a TimeStep,
+    /// What holds the body in this step.
+    pub held: &'a Held,
 }
 
 impl<'a> SolverContext<'a> {
+    /// The support groups that hold nothing.
+    pub(super) fn let_go_groups(&self) -> impl Iterator<Item = &'a Group> {
+        let let_go = self.held.let_go;
+        let groups = self.corrections.groups.iter().enumerate();
+        groups.filter_map(move |(at, group)| (let_go >> at & 1 != 0).then_some(group))
+    }
+
     pub(super) fn env(&self) -> Env<'a> {
         Env {
             isa: self.isa,
@@ -97,7 +108,11 @@ impl<'a> SolverContext<'a> {
             space: &self.corrections.space,
             body: &self.corrections.body,
             time_step: self.time_step,
-            whole: self.corrections.whole.get().and_then(Option::as_ref),
+            whole: match &self.held.modes.0 {
+                Some(modes) => Some(modes),
+                None => self.corrections.whole.get().and_then(Option::as_ref),
+            },
+            held: self.held,
         }
     }
 }

@@ -8,6 +8,7 @@
 //! Displacements mm, forces µN, masses g, times s.
 
 mod body;
+mod boundary;
 mod cut;
 mod cut_loads;
 mod estimate;
@@ -15,9 +16,11 @@ mod far;
 mod free;
 mod gravity;
 mod gravity_columns;
+mod group;
 mod history;
 mod input;
 mod integrate;
+mod lift;
 mod load;
 mod loading;
 mod local;
@@ -47,6 +50,7 @@ use time_step::Diagonal;
 use whole::WholeModes;
 
 pub use body::Body;
+pub use boundary::Held;
 pub use far::FarField;
 pub use history::{History, PAIRS};
 pub use input::{Enough, Input, Report, SolverContext};
@@ -68,6 +72,8 @@ pub struct Corrections {
     pub time_step: Arc<TimeStep>,
     /// Of a body that has been cut: nodes of what has changed, a few millimetres apart, ascending. They are near in every step.
     pub changed: Vec<u32>,
+    /// The bundle's support groups.
+    pub groups: Vec<group::Group>,
     /// Made at the first step in which gravity turns.
     gravity: OnceLock<GravityResponse>,
     /// Of the intact body from its first cut on, and of every cut one.
@@ -102,6 +108,7 @@ impl Corrections {
             body,
             time_step: Arc::new(TimeStep::new(&diagonal, integrator)?),
             changed: Vec::new(),
+            groups: group::groups(mesh)?,
             gravity: OnceLock::new(),
             diagonal: OnceLock::new(),
             whole: OnceLock::new(),

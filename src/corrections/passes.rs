@@ -89,7 +89,7 @@ pub(super) fn add_smoothed(
         let rows = r[range.clone()].as_chunks::<3>().0.iter();
         let places = change.as_chunks_mut::<3>().0.iter_mut();
         for ((change, r), node) in places.zip(rows).zip(range.start / 3..) {
-            if !is_near(node as u32) && !env.body.held[node] {
+            if !is_near(node as u32) && !env.held.is[node] {
                 let [xx, xy, xz, yy, yz, zz] = blocks[node];
                 let own = [
                     xx * r[0] + xy * r[1] + xz * r[2],
@@ -193,7 +193,7 @@ pub(super) fn square(env: Env<'_>, a: &[f32], partial: &mut PartialSums) -> Resu
 /// Zero at the held nodes of a piece.
 fn hold(env: Env<'_>, range: &Range<usize>, field: &mut [f32]) {
     let nodes = (range.start / 3) as u32..(range.end / 3) as u32;
-    let held = &env.body.held_nodes;
+    let held = &env.held.nodes;
     let first = held.partition_point(|node| *node < nodes.start);
     for node in held[first..].iter().take_while(|node| **node < nodes.end) {
         let at = 3 * (node - nodes.start) as usize;

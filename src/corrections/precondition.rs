@@ -12,6 +12,7 @@ mod near;
 mod response;
 
 use super::body::Body;
+use super::boundary::Held;
 use super::time_step::TimeStep;
 use super::whole::{WholeModes, WholeSolve};
 use crate::error::{Error, Result};
@@ -40,6 +41,8 @@ pub struct Env<'a> {
     pub time_step: &'a TimeStep,
     /// Read by then where the step has a load.
     pub whole: Option<&'a WholeModes>,
+    /// What holds the body in the step.
+    pub held: &'a Held,
 }
 
 /// The preconditioner for one set of prescribed nodes, and its buffers.
@@ -83,6 +86,8 @@ pub struct Preconditioner {
     /// Made at the first step with a load.
     whole: Option<Box<WholeSolve>>,
     has_load: bool,
+    /// The support groups that were let go when it was made.
+    let_go: u64,
     ready: bool,
 }
 
@@ -137,6 +142,7 @@ impl Preconditioner {
             forces: memory::room(room, WHAT)?,
             whole: None,
             has_load: false,
+            let_go: 0,
             ready: false,
         })
     }
@@ -171,7 +177,7 @@ impl Preconditioner {
         self.columns.clear();
         self.dofs.clear();
         for &node in nodes {
-            if let Some((column, true)) = env.prior.column_for(&env.body.held, node) {
+            if let Some((column, true)) = env.prior.column_for(&env.held.is, node) {
                 self.columns.push(column as u32);
                 self.dofs
                     .extend([0, 1, 2].map(|axis| 3 * column as u32 + axis));
@@ -249,7 +255,7 @@ impl Preconditioner {
             z[2] += w * (xz * r[0] + yz * r[1] + zz * r[2]);
         }
         mask(&self.nodes, z);
-        mask_held(&env.body.held, z);
+        mask_held(&env.held.is, z);
         Ok(())
     }
 

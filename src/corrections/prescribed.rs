@@ -1,7 +1,6 @@
 //! A step whose contact is prescribed: where the nodes in contact end is known, and the rest of the field follows.
 
 use super::input::{Input, Report, SolverContext};
-use super::precondition::mask_held;
 use super::solver::{ImplicitSolver, MOST_PARTS, SMALLEST_DET};
 use crate::error::Result;
 use crate::field::ContactSet;
@@ -17,7 +16,7 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         let env = context.env();
         let _awake = context.pool.keep_awake();
-        let held = &env.body.held;
+        let held = &env.held.is;
         let forces = 3 * input.contact.len();
         memory::fit(&mut self.next.reaction, forces, "contact forces")?;
         self.nodes.clear();
@@ -25,7 +24,7 @@ impl ImplicitSolver {
         self.nodes
             .extend(nodes.filter(|&&node| !held[node as usize]));
         self.preconditioner.prescribe(env, &self.nodes)?;
-        self.preconditioner.expect_load(env, input.load.is_some())?;
+        self.expect(context, input)?;
         self.memory.begin();
         self.memory.mask(&self.nodes);
         self.prepare(context, input)?;
@@ -72,7 +71,7 @@ impl ImplicitSolver {
             let at = 3 * self.nodes[index] as usize;
             u[at..at + 3].copy_from_slice(&target(index));
         }
-        mask_held(&env.body.held, u);
+        env.held.put(u);
         let (det, _) = self.residual(context, [input.last, u, u], g, report)?;
         self.stand();
         Ok(det)
@@ -86,7 +85,7 @@ impl ImplicitSolver {
         g: &[f32],
     ) -> Result<()> {
         let env = context.env();
-        let held = &env.body.held;
+        let held = &env.held.is;
         let reaction = &mut self.next.reaction;
         let mut rows = self.at_nodes[1].as_chunks::<3>().0.iter();
         for &node in &contact.nodes {
@@ -131,9 +130,11 @@ impl ImplicitSolver {
         let mut det = loop {
             if lost {
                 u.fill(0.0);
+                self.lift(context, input, None, u)?;
             } else {
                 u.copy_from_slice(input.last);
                 self.add_gravity(context, input, u)?;
+                self.lift(context, input, Some(input.last), u)?;
             }
             let part = 1.0 / parts as f32;
             let det = self.lead(context, input, part, u, g, report)?;

@@ -55,6 +55,8 @@ pub struct ImplicitSolver {
     /// Made at the first step that tools drive.
     pub(super) local: Option<Box<LocalSolver>>,
     pub(super) free: Oscillators,
+    /// The support groups that are let go in what it remembers.
+    pub(super) let_go: u64,
 }
 
 impl ImplicitSolver {
@@ -91,6 +93,7 @@ impl ImplicitSolver {
             touched: field()?,
             local: None,
             free: Oscillators::default(),
+            let_go: context.held.let_go,
         })
     }
 
@@ -192,6 +195,10 @@ impl ImplicitSolver {
         let sizes = [corrections.body.mass.len(), corrections.space.count()];
         local.iter().try_for_each(|record| record.check(sizes))?;
         self.motion.take(motion)?;
+        if self.let_go != context.held.let_go {
+            self.local = None;
+            self.let_go = context.held.let_go;
+        }
         self.clear_pairs();
         self.commit_pairs();
         for Pair { step, change } in pairs {

@@ -16,6 +16,7 @@
 
 mod fall_back;
 mod freely;
+mod let_go;
 mod rounds;
 
 use super::input::{Input, Report, SolverContext};
@@ -113,7 +114,7 @@ impl ImplicitSolver {
         self.nodes.clear();
         problem.take_length(context.time_step.integrator.step_s as f32);
         self.memory.mask(&[]);
-        (self.preconditioner).expect_load(context.env(), input.load.is_some())?;
+        self.expect(context, input)?;
         self.prepare(context, input)?;
         let mut report = Report {
             level: self.motion.level as usize,
@@ -155,6 +156,9 @@ impl ImplicitSolver {
     ) -> Result<()> {
         let _span = tracing::trace_span!("guess").entered();
         self.guess_loaded(context, input, problem, at, report)?;
+        if context.held.let_go != 0 && at.det > SMALLEST_DET {
+            self.move_let_go(context, input, problem, at, report)?;
+        }
         self.guess.copy_from_slice(at.u);
         problem.keep_guess()?;
         let mut size = self.improve_loaded(context, input, problem, at, report)?;
@@ -223,6 +227,7 @@ impl ImplicitSolver {
             problem.restart();
             at.u.copy_from_slice(input.last);
             self.add_gravity(context, input, at.u)?;
+            self.lift(context, input, Some(input.last), at.u)?;
             self.move_freely(env)?;
             let parts = ways.max(iterated);
             let mut part = 0;
@@ -261,9 +266,9 @@ impl ImplicitSolver {
     }
 
     /// The coordinates become `-N diag(1 / (m (w² + kappa))) N^T [I_{n+1}(u_n) - I_n]`: what the natural modes do by themselves.
-    fn move_freely(&mut self, env: Env<'_>) -> Result<()> {
+    pub(super) fn move_freely(&mut self, env: Env<'_>) -> Result<()> {
         passes::difference(env, &self.drift, &self.motion.inertia, &mut self.q)?;
-        mask_held(&env.body.held, &mut self.q);
+        mask_held(&env.held.is, &mut self.q);
         self.preconditioner.move_natural(env, &self.q)
     }
 
@@ -291,7 +296,7 @@ impl ImplicitSolver {
     }
 
     /// `u` and what the coordinates hold become one.
-    fn settle(&mut self, env: Env<'_>, u: &mut [f32]) -> Result<()> {
+    pub(super) fn settle(&mut self, env: Env<'_>, u: &mut [f32]) -> Result<()> {
         self.preconditioner.decode(env, &mut self.q)?;
         passes::add(env, &mut self.q, u)
     }
@@ -312,7 +317,7 @@ impl ImplicitSolver {
             let range = 3 * node as usize..3 * node as usize + 3;
             let base = &u[range.clone()];
             let touched = &mut self.touched[range];
-            match env.body.held[node as usize] {
+            match env.held.is[node as usize] {
                 true => touched.copy_from_slice(base),
                 false => touched.iter_mut().zip(base).for_each(|(t, u)| *t += u),
             }
@@ -374,7 +379,7 @@ fn compliance<'a>(
 ) -> Compliance<'a> {
     Compliance::at_rest(
         context.prior,
-        &context.corrections.body.held,
+        &context.held.is,
         Some((
             &context.corrections.space,
             preconditioner.inertial_compliance(),

@@ -108,8 +108,72 @@ impl WholeModes {
         Ok(cut)
     }
 
-    fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.own[0].len().isqrt()
+    }
+
+    /// Room for `count` modes of `len` numbers, of which the first are those of `known`; products with the others are zero.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub(super) fn with_room(
+        len: usize,
+        coarse: usize,
+        count: usize,
+        known: Option<&WholeModes>,
+    ) -> Result<WholeModes> {
+        let mut fields = memory::room(count * len, WHAT)?;
+        let tables = |rows: usize| -> Result<[Vec<f32>; 2]> {
+            let table = || memory::zeros(rows * count, WHAT);
+            Ok([table()?, table()?])
+        };
+        let (mut cross, mut own) = (tables(coarse)?, tables(count)?);
+        if let Some(known) = known {
+            fields.extend_from_slice(&known.fields);
+            let width = known.count();
+            for (to, from) in
+                (cross.iter_mut().zip(&known.cross)).chain(own.iter_mut().zip(&known.own))
+            {
+                for (to, from) in to.chunks_exact_mut(count).zip(from.chunks_exact(width)) {
+                    to[..width].copy_from_slice(from);
+                }
+            }
+        }
+        Ok(WholeModes {
+            fields: Arc::new(fields),
+            parents: Vec::new(),
+            cross,
+            own,
+        })
+    }
+
+    /// Adds a field, for which there is room.
+    pub(super) fn push(&mut self, field: &[f32]) {
+        if let Some(fields) = Arc::get_mut(&mut self.fields) {
+            fields.extend_from_slice(field);
+        }
+    }
+
+    /// Takes the products of mode `at` with those before it and with itself: `product [3K]` is that of `K` (table 0) or `M` with its field, `on_modes` what it has
+    /// of `Phi`.
+    pub(super) fn take_products(
+        &mut self,
+        table: usize,
+        at: usize,
+        product: &[f32],
+        on_modes: &[f32],
+    ) {
+        let count = self.count();
+        for (row, value) in self.cross[table].chunks_exact_mut(count).zip(on_modes) {
+            row[at] = *value;
+        }
+        for (other, field) in self.fields.chunks_exact(product.len()).enumerate() {
+            let sum: f64 = (field.iter().zip(product))
+                .map(|(v, product)| f64::from(*v) * f64::from(*product))
+                .sum();
+            self.own[table][at * count + other] = sum as f32;
+            self.own[table][other * count + at] = sum as f32;
+        }
     }
 
     /// Numbers of a field of the intact body, `3K`.

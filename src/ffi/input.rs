@@ -7,13 +7,30 @@ use super::convert;
 use super::failure::{Failure, fail};
 use super::pointers::{each, options, slice};
 use super::step_structs::*;
+use super::support_structs::upt_support;
 use super::ties::taken;
 use crate::contact::{MAX_TIES, MAX_TOOLS, Tool};
 use crate::features;
 use crate::scene::{
-    Contact, Lists, Loads, MAX_PRESSURES, Pressure, Scene, StepInput, SupportPose, View,
+    Contact, GroupMotion, Lists, Loads, MAX_PRESSURES, MAX_SUPPORTS, Pressure, Scene, StepInput,
+    SupportPose, View,
 };
 use ::contact::Tie;
+
+/// Room for what of an input points into the host's arrays.
+pub(super) struct Arrays {
+    pressures: [Pressure<'static>; MAX_PRESSURES],
+    supports: [GroupMotion<'static>; MAX_SUPPORTS],
+}
+
+impl Default for Arrays {
+    fn default() -> Arrays {
+        Arrays {
+            pressures: [Pressure::default(); MAX_PRESSURES],
+            supports: [GroupMotion::default(); MAX_SUPPORTS],
+        }
+    }
+}
 
 /// The host's input; its instruments, ties and pressures are read into lists, its arrays stay where they are.
 ///
@@ -23,7 +40,7 @@ pub(super) unsafe fn read_input<'a>(
     scene: &Scene,
     raw: *const upt_input,
     Lists { tools, ties }: &'a mut Lists,
-    pressures: &'a mut [Pressure<'static>; MAX_PRESSURES],
+    arrays: &'a mut Arrays,
 ) -> Result<StepInput<'a>, Failure> {
     // SAFETY: the caller's.
     let raw = unsafe { options(raw, "input") }?;
@@ -69,7 +86,7 @@ pub(super) unsafe fn read_input<'a>(
         displacement: unsafe { field(scene, raw.displacement, "input.displacement") }?,
         contact,
         // SAFETY: the caller's.
-        loads: unsafe { read_loads(scene, &raw, pressures, ties) }?,
+        loads: unsafe { read_loads(scene, &raw, arrays, ties) }?,
         time_s: raw.time_s,
     })
 }
@@ -81,7 +98,10 @@ pub(super) unsafe fn read_input<'a>(
 unsafe fn read_loads<'a>(
     scene: &Scene,
     raw: &upt_input,
-    pressures: &'a mut [Pressure<'static>; MAX_PRESSURES],
+    Arrays {
+        pressures,
+        supports,
+    }: &'a mut Arrays,
     ties: &'a mut Vec<Tie>,
 ) -> Result<Loads<'a>, Failure> {
     if raw.tie_count != 0 {
@@ -125,7 +145,10 @@ unsafe fn read_loads<'a>(
     };
     // SAFETY: the caller's.
     unsafe { each(raw.pressures, raw.pressure_count, "input.pressures", read) }?;
+    // SAFETY: the caller's.
+    let supports = unsafe { read_supports(raw, supports) }?;
     Ok(Loads {
+        supports,
         gravity: raw.gravity,
         gravity_at_rest: raw.gravity_at_rest,
         // SAFETY: the caller's.
@@ -139,6 +162,56 @@ unsafe fn read_loads<'a>(
             },
         ),
     })
+}
+
+/// What the support groups do.
+///
+/// # Safety
+/// As [`read_input`]; the lists of displacements outlive what is read.
+unsafe fn read_supports<'a>(
+    raw: &upt_input,
+    supports: &'a mut [GroupMotion<'static>; MAX_SUPPORTS],
+) -> Result<&'a [GroupMotion<'static>], Failure> {
+    if raw.support_count > MAX_SUPPORTS as u64 {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!(
+                "input.support_count is {}, must be at most {MAX_SUPPORTS}",
+                raw.support_count
+            ),
+        );
+    }
+    let read = |index: usize, one: upt_support| {
+        if one.reserved != [0; 3] || one.let_go > 1 {
+            return fail(
+                UPT_ERR_ARGUMENT,
+                format!("input.supports[{index}]: let_go must be 0 or 1, and reserved zero"),
+            );
+        }
+        let has_pose = one.rotation != [0.0; 4] || one.position != [0.0; 3];
+        let rotation = match one.rotation == [0.0; 4] {
+            true => [0.0, 0.0, 0.0, 1.0],
+            false => one.rotation,
+        };
+        let name = format!("input.supports[{index}].displacements");
+        supports[index] = GroupMotion {
+            group: one.group,
+            let_go: one.let_go != 0,
+            pose: has_pose.then_some(SupportPose {
+                position: one.position,
+                rotation,
+            }),
+            displacements: match one.displacements.is_null() && one.displacement_count == 0 {
+                true => None,
+                // SAFETY: the caller's.
+                false => Some(unsafe { slice(one.displacements, one.displacement_count, &name) }?),
+            },
+        };
+        Ok(())
+    };
+    // SAFETY: the caller's.
+    unsafe { each(raw.supports, raw.support_count, "input.supports", read) }?;
+    Ok(&supports[..raw.support_count as usize])
 }
 
 /// A dense field `[K,3]` of the intact mesh, or none.

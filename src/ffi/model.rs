@@ -187,3 +187,47 @@ pub unsafe extern "C" fn upt_model_indices(
         },
     )
 }
+
+/// Names a support group of a bundle, and copies its nodes: what `upt_input.supports` moves.
+///
+/// - `group`: from 0; the groups end where this is `UPT_ERR_ARGUMENT` (`upt_model_describe` lists them).
+/// - `name`: receives text with its NUL; NULL with capacity 0 leaves it out.
+/// - `nodes`: node indices, ascending; NULL with capacity 0 only queries the size.
+/// - `node_capacity`: number of indices that fit in `nodes`.
+/// - `needed`: number of nodes of the group, always written; may be NULL.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such group, a capacity too small).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_model_support(
+    model: *const upt_model,
+    group: u32,
+    name: *mut c_char,
+    name_capacity: u64,
+    nodes: *mut u32,
+    node_capacity: u64,
+    needed: *mut u64,
+) -> upt_status {
+    call(
+        "upt_model_support",
+        || (),
+        || {
+            let model = find_model(model)?;
+            let count = model.supports().count();
+            let Some((text, own)) = model.supports().nth(group as usize) else {
+                return super::failure::fail(
+                    UPT_ERR_ARGUMENT,
+                    format!("group is {group}, the bundle has {count}"),
+                );
+            };
+            if !name.is_null() || name_capacity != 0 {
+                // SAFETY: `name` has room for `name_capacity` elements, as the header asks.
+                let status =
+                    unsafe { output::copy_text(text, name, name_capacity, std::ptr::null_mut()) }?;
+                debug_assert_eq!(status, UPT_OK);
+            }
+            // SAFETY: `nodes` has room for that many elements and `needed` is NULL or writable, as the header asks.
+            unsafe { output::copy_out(own, nodes, node_capacity, needed) }
+        },
+    )
+}

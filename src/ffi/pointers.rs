@@ -8,6 +8,7 @@ use super::constants::*;
 use super::failure::{Failure, fail};
 use super::step_structs::*;
 use super::structs::*;
+use super::support_structs::upt_support;
 
 /// A struct that starts with `struct_size`. Later versions only grow; each size ever published stays known.
 ///
@@ -40,6 +41,7 @@ sized!(
     upt_input,
     upt_pressure,
     upt_tie,
+    upt_support,
     upt_tie_reading,
     upt_bed,
     upt_view

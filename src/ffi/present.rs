@@ -42,9 +42,9 @@ pub unsafe extern "C" fn upt_scene_present(
     call_scene("upt_scene_present", scene, |scene| {
         features::instruments()?;
         let mut lists = scene.frame_lists()?;
-        let mut pressures = Default::default();
+        let mut arrays = Default::default();
         // SAFETY: the host passes what the header asks for.
-        let input = unsafe { read_input(scene, input, &mut lists, &mut pressures) }?;
+        let input = unsafe { read_input(scene, input, &mut lists, &mut arrays) }?;
         // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
         let view = unsafe { read_view(view) }?;
         // SAFETY: the host passes room for that many elements, as the header asks.

@@ -8,7 +8,9 @@ use super::registry::{add_scene, call_scene, find_model, remove_scene};
 use super::step_structs::upt_input;
 use super::structs::*;
 use super::{convert, pointers};
-use crate::scene::{Contact, Loads, MAX_PRESSURES, Pressure, Scene, StepInput, View};
+use crate::scene::{
+    Contact, GroupMotion, Loads, MAX_PRESSURES, MAX_SUPPORTS, Pressure, Scene, StepInput, View,
+};
 use std::borrow::Cow;
 
 /// Creates a scene at rest.
@@ -99,9 +101,9 @@ pub unsafe extern "C" fn upt_scene_step(
 ) -> upt_status {
     call_scene("upt_scene_step", scene, |scene| {
         let mut lists = scene.lists()?;
-        let mut pressures = Default::default();
+        let mut arrays = Default::default();
         // SAFETY: the host passes what the header asks for.
-        let input = unsafe { read_input(scene, input, &mut lists, &mut pressures) }?;
+        let input = unsafe { read_input(scene, input, &mut lists, &mut arrays) }?;
         // SAFETY: the host passes `out_count` floats of room, as the header asks.
         unsafe { step(scene, input, out, out_count) }
     })
@@ -206,12 +208,25 @@ unsafe fn step(
             ..*pressure
         };
     }
+    let mut moves: [Cow<'_, [f32]>; MAX_SUPPORTS] = std::array::from_fn(|_| Cow::Borrowed(&[][..]));
+    let mut supports = [GroupMotion::default(); MAX_SUPPORTS];
+    let groups = input.loads.supports.len();
+    for (given, support) in moves.iter_mut().zip(input.loads.supports) {
+        *given = apart(support.displacements.unwrap_or_default(), &out)?;
+    }
+    for ((own, given), support) in (supports.iter_mut().zip(&moves)).zip(input.loads.supports) {
+        *own = GroupMotion {
+            displacements: support.displacements.map(|_| &**given),
+            ..*support
+        };
+    }
     let input = StepInput {
         displacement: displacement.as_deref(),
         contact,
         loads: Loads {
             forces: forces.as_deref(),
             pressures: &pressures[..count],
+            supports: &supports[..groups],
             ..input.loads
         },
         time_s: input.time_s,

@@ -4,6 +4,8 @@ use core::ffi::c_void;
 use core::ptr::null;
 use safer_ffi::derive_ReprC;
 
+use super::support_structs::upt_support;
+
 /// The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
 /// by itself.
 ///
@@ -47,6 +49,11 @@ pub struct upt_input {
     pub ties: *const upt_tie,
     /// At most 256.
     pub tie_count: u64,
+    /// `[support_count]`: what support groups of the bundle do, each at most once, all with the same `struct_size`. A group that is not named is held where it was
+    /// meshed, or where it was held again. Pass them in every step.
+    pub supports: *const upt_support,
+    /// At most 64.
+    pub support_count: u64,
     /// Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.
     pub gravity: [f32; 3],
     /// Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.
@@ -80,6 +87,8 @@ impl upt_input {
         pressure_count: 0,
         ties: null(),
         tie_count: 0,
+        supports: null(),
+        support_count: 0,
         gravity: [0.0; 3],
         gravity_at_rest: [0.0; 3],
         support_position: [0.0; 3],

@@ -29,9 +29,9 @@ pub unsafe extern "C" fn upt_scene_submit(
 ) -> upt_status {
     call_scene("upt_scene_submit", scene, |scene| {
         let mut lists = scene.lists()?;
-        let mut pressures = Default::default();
+        let mut arrays = Default::default();
         // SAFETY: the host passes what the header asks for.
-        scene.submit(unsafe { read_input(scene, input, &mut lists, &mut pressures) }?)?;
+        scene.submit(unsafe { read_input(scene, input, &mut lists, &mut arrays) }?)?;
         Ok(UPT_OK)
     })
 }

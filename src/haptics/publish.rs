@@ -201,7 +201,7 @@ impl Link {
     /// [`Error::OutOfMemory`]; [`Error::Panic`] of a worker. The problem before stays.
     pub fn publish(&mut self, step: &Stepped<'_>) -> Result<()> {
         self.find(step)?;
-        let held = &step.corrections.body.held;
+        let held = &step.corrections.body.held.is;
         let compliance = Compliance::at_rest(
             step.prior,
             held,

@@ -4,6 +4,7 @@ mod anchors;
 mod cut;
 mod info;
 mod reduced;
+mod supports;
 mod upt;
 mod upt_stages;
 
@@ -134,7 +135,8 @@ impl Model {
         let process = library::current();
         let manifest = files.manifest.clone();
         let mesh_file = files.tensors(&manifest.mesh.file)?;
-        let mesh = Mesh::parse(&mesh_file, manifest.boundary)?;
+        let mut mesh = Mesh::parse(&mesh_file, manifest.boundary)?;
+        mesh.take_supports(&manifest.supports)?;
         if mesh.node_count() != manifest.mesh.nodes {
             return Err(crate::error::Error::bundle(
                 "bundle.json",
@@ -317,6 +319,9 @@ impl Model {
             "bundle_sha256": crate::bundle::hex(&self.hash),
             "mesh_sha256": self.mesh.sha256,
             "nodes": self.mesh.node_count(),
+            "supports": self.mesh.supports.iter().map(|group| {
+                serde_json::json!({"name": group.name, "nodes": group.nodes.len()})
+            }).collect::<Vec<_>>(),
             "threads": self.threads,
             "stages": stages,
             "providers_refused": refused,

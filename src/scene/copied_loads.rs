@@ -4,6 +4,7 @@ use ::contact::Tie;
 
 use super::loads::{Loads, MAX_PRESSURES, Pressure, WHAT};
 use super::support::SupportPose;
+use super::supports::{GroupMotion, MAX_SUPPORTS};
 use crate::error::Result;
 use crate::memory;
 
@@ -20,6 +21,16 @@ pub(super) struct CopiedLoads {
     /// How many of them each pressure has, and its size, Pa.
     pressures: Vec<(usize, f32)>,
     ties: Vec<Tie>,
+    /// Support groups, and their displacements one list after the other.
+    supports: Vec<CopiedGroup>,
+    displacements: Vec<f32>,
+}
+
+/// A group, and how many numbers its displacements have.
+#[derive(Clone, Copy)]
+struct CopiedGroup {
+    motion: GroupMotion<'static>,
+    count: Option<usize>,
 }
 
 impl CopiedLoads {
@@ -31,6 +42,23 @@ impl CopiedLoads {
         memory::fit(&mut self.nodes, nodes.sum(), WHAT)?;
         memory::fit(&mut self.pressures, loads.pressures.len(), WHAT)?;
         memory::replace(&mut self.ties, loads.ties, WHAT)?;
+        let given = |motion: &GroupMotion<'_>| motion.displacements.map(<[f32]>::len);
+        let numbers = loads.supports.iter().filter_map(given);
+        memory::fit(&mut self.displacements, numbers.sum(), WHAT)?;
+        memory::fit(&mut self.supports, loads.supports.len(), WHAT)?;
+        self.displacements.clear();
+        self.supports.clear();
+        for motion in loads.supports {
+            self.displacements
+                .extend_from_slice(motion.displacements.unwrap_or_default());
+            self.supports.push(CopiedGroup {
+                motion: GroupMotion {
+                    displacements: None,
+                    ..*motion
+                },
+                count: given(motion),
+            });
+        }
         self.gravity = loads.gravity;
         self.gravity_at_rest = loads.gravity_at_rest;
         self.support = loads.support;
@@ -56,6 +84,16 @@ impl CopiedLoads {
             *pressure = Pressure { nodes: own, pascal };
             nodes = rest;
         }
+        let mut supports = [GroupMotion::default(); MAX_SUPPORTS];
+        let mut numbers = &*self.displacements;
+        for (support, copied) in supports.iter_mut().zip(&self.supports) {
+            *support = copied.motion;
+            if let Some(count) = copied.count {
+                let (own, rest) = numbers.split_at(count);
+                support.displacements = Some(own);
+                numbers = rest;
+            }
+        }
         call(Loads {
             gravity: self.gravity,
             gravity_at_rest: self.gravity_at_rest,
@@ -63,6 +101,7 @@ impl CopiedLoads {
             pressures: &pressures[..self.pressures.len()],
             support: self.support,
             ties: &self.ties,
+            supports: &supports[..self.supports.len().min(MAX_SUPPORTS)],
         })
     }
 }

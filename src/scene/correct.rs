@@ -41,6 +41,7 @@ impl Core {
             prior,
             corrections,
             time_step: &time_step,
+            held: Core::held_of(&self.loads, corrections),
         };
         let touched = !self.incoming.is_empty();
         // The learned part takes over some steps after a release; with a length of step of the scene's own it never does.
@@ -181,6 +182,7 @@ impl Core {
             prior,
             corrections: self.model.corrections()?,
             time_step: &corrected.time_step,
+            held: Core::held_of(&self.loads, self.model.corrections()?),
         };
         corrected.solver.restore(context, &history)
     }

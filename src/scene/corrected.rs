@@ -133,6 +133,7 @@ impl Corrector {
             prior,
             corrections,
             time_step: &time_step,
+            held: &corrections.body.held,
         };
         Ok(Some(Corrector {
             solver: memory::boxed(ImplicitSolver::new(context)?, WHAT)?,

@@ -14,6 +14,7 @@ use super::StepInput;
 use super::build::build;
 use super::core::{Core, SCENE, lock_read, lock_write};
 use super::cut_state::CutState;
+use super::load_state::LoadState;
 use super::published::{BodyNumber, CutModel, Frame, Published};
 use crate::bundle::Mesh;
 use crate::contact::{Force, Past};
@@ -71,7 +72,7 @@ impl Core {
 
     /// Whether a cut body can make such a step.
     pub(super) fn check_cut(&self, input: &StepInput<'_>) -> Result<()> {
-        if input.loads.support.is_some() {
+        if input.loads.support.is_some() || !input.loads.supports.is_empty() {
             return self.check_intact("a step with a support that moves");
         }
         if !input.loads.ties.is_empty() {
@@ -100,7 +101,8 @@ impl Core {
                 "cut: a body with ties cannot be cut; make a step without them first".into(),
             ));
         }
-        if self.loads.as_ref().is_some_and(|loads| loads.carried()) {
+        let moves = |loads: &LoadState| loads.carried() || loads.has_moved_groups();
+        if self.loads.as_ref().is_some_and(|loads| moves(loads)) {
             return Err(Error::Unsupported(
                 "cut: a body whose support moves cannot be cut; make a step without one first"
                     .into(),

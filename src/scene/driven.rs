@@ -161,6 +161,7 @@ impl Core {
             prior,
             corrections: self.model.corrections()?,
             time_step: &time_step,
+            held: Core::held_of(&self.loads, self.model.corrections()?),
         };
         corrected.be_ready(context, &self.model)?;
         let shared = lock_read(published);
@@ -181,7 +182,12 @@ impl Core {
             substepper,
             ..
         } = corrected;
-        let parts = substeps.as_deref_mut().zip(substepper.as_deref_mut());
+        // A support group ends where it is led in one step.
+        let leads = self
+            .loads
+            .as_ref()
+            .is_some_and(|loads| loads.held.is_some());
+        let parts = (substeps.as_deref_mut().zip(substepper.as_deref_mut())).filter(|_| !leads);
         let report = solver.drive(context, &input, problem, parts, next)?;
         corrected.report_to(&report, stats);
         drop(shared);

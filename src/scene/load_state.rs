@@ -5,8 +5,9 @@ use topology::{Body, Push};
 use super::loads::{Acting, Loads, WHAT};
 use super::pressed::Pressed;
 use super::support::{Carriage, Carried};
+use super::supports::{self, Moved};
 use crate::bundle::Mesh;
-use crate::corrections::Load;
+use crate::corrections::{Held, Load};
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
 
@@ -30,6 +31,9 @@ pub struct LoadState {
     takes: Vec<f32>,
     /// Mean of the nodes at rest.
     middle: [f32; 3],
+    /// What holds the body in the step being made; none where that is what the bundle holds, at rest.
+    pub(super) held: Option<Box<Held>>,
+    moved: Moved,
 }
 
 impl LoadState {
@@ -67,6 +71,8 @@ impl LoadState {
         }
         Ok(LoadState {
             middle,
+            held: None,
+            moved: Moved::default(),
             last: Acting::zeros(mesh)?,
             next: Acting::zeros(mesh)?,
             faces: numbers().and(memory::room(most, WHAT))?,
@@ -136,6 +142,12 @@ impl LoadState {
             Some(copy) => parents[copy] as usize,
             None => node,
         };
+        supports::follow(
+            mesh,
+            loads.supports,
+            (&self.last.supports, u),
+            (&mut self.next.supports, &mut self.held, &mut self.moved),
+        )?;
         let next = &mut self.next;
         let pose = loads.support.map(|support| support.checked()).transpose()?;
         let carried = pose.map(|pose| Carried::follow(self.last.carried.as_ref(), &pose, step_s));
@@ -146,6 +158,7 @@ impl LoadState {
         let pushed = &self.last.pushed;
         next.acts = loads.acts_with(acceleration)
             || carriage.is_some_and(|own| own.acts())
+            || supports::acts(&next.supports)
             || !pushed.is_empty();
         let acceleration = acceleration.map(|a| 1e3 * a);
         next.gravity = acceleration;
@@ -216,6 +229,11 @@ impl LoadState {
     /// Whether the last published state has a support that moves.
     pub(super) fn carried(&self) -> bool {
         self.last.carried.is_some()
+    }
+
+    /// Whether the last published state has a support group that is not as it was meshed.
+    pub(super) fn has_moved_groups(&self) -> bool {
+        supports::acts(&self.last.supports)
     }
 
     /// Whether any acts in the last published state or the one being made.

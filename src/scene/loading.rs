@@ -8,7 +8,8 @@ use super::core::{Core, lock_read};
 use super::load_state::LoadState;
 use super::loads::{Acting, Loads, WHAT};
 use super::published::Published;
-use crate::corrections::SolverContext;
+use super::supports;
+use crate::corrections::{Corrections, Held, ImplicitSolver, SolverContext};
 use crate::error::{Error, Result};
 use crate::memory;
 
@@ -23,6 +24,7 @@ impl Core {
         loads: &Loads<'_>,
     ) -> Result<bool> {
         loads.check(self.intact_mesh().node_count())?;
+        supports::check(loads.supports, &self.intact_mesh().supports)?;
         if self.loads.is_none() && !loads.acts() {
             return Ok(false);
         }
@@ -48,7 +50,41 @@ impl Core {
         if turns {
             self.prepare_turning()?;
         }
+        self.prepare_let_go()?;
         Ok(acts)
+    }
+
+    /// What the groups do that are let go, where another set of them was in the step before.
+    fn prepare_let_go(&mut self) -> Result<()> {
+        let held = self
+            .loads
+            .as_mut()
+            .and_then(|loads| loads.held.as_deref_mut());
+        let (Some(held), Some(prior)) = (held, &self.model.prior) else {
+            return Ok(());
+        };
+        if held.let_go == 0 || held.modes.is_made() {
+            return Ok(());
+        }
+        let corrections = self.model.corrections()?;
+        let context = SolverContext {
+            isa: self.machine.isa,
+            pool: &self.machine.pool,
+            prior,
+            corrections,
+            time_step: &corrections.time_step,
+            held: &corrections.body.held,
+        };
+        ImplicitSolver::let_go(context, &self.mesh.positions, held)
+    }
+
+    /// What holds the body in the step being made.
+    pub(super) fn held_of<'a>(
+        loads: &'a Option<Box<LoadState>>,
+        corrections: &'a Corrections,
+    ) -> &'a Held {
+        let own = loads.as_ref().and_then(|loads| loads.held.as_deref());
+        own.unwrap_or(&corrections.body.held)
     }
 
     /// No loads, of the body as it is.
@@ -81,6 +117,7 @@ impl Core {
             prior,
             corrections,
             time_step: &corrections.time_step,
+            held: &corrections.body.held,
         };
         (self.model.corrections()?).follow_gravity(context, cut.body.parents())
     }
@@ -128,6 +165,7 @@ impl Core {
         if let Some(state) = &mut self.loads {
             state.last.clear();
             state.next.clear();
+            state.held = None;
         }
     }
 
@@ -150,6 +188,7 @@ impl Core {
             Some(state) => state,
             None => self.blank_loads()?,
         };
+        state.held = supports::restored(&self.mesh, &acting.supports)?;
         state.last = acting;
         self.loads = Some(state);
         Ok(())

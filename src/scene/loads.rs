@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use ::contact::Tie;
 
 use super::support::{Carriage, Carried, SupportPose};
+use super::supports::{self, GroupMotion, GroupState};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
@@ -41,6 +42,8 @@ pub struct Loads<'a> {
     /// Ties of the tissue, at most 256, beside tools or without any. A tie's place in the list is its identity: pass every tie in every step, in the same order.
     /// A broken one stays broken in its place, until it has a stiffness of 0 there or the list ends before it.
     pub ties: &'a [Tie],
+    /// What support groups of the bundle do, each at most once; one that is not named is held where it was meshed (or where it was held again). Pass them in every step.
+    pub supports: &'a [GroupMotion<'a>],
 }
 
 /// A pressure on a part of the surface.
@@ -62,11 +65,14 @@ impl Loads<'_> {
         pressures: &[],
         support: None,
         ties: &[],
+        supports: &[],
     };
 
     /// Whether they are not all zero, or a support is given; ties are no loads here.
     pub(crate) fn acts(&self) -> bool {
-        self.acts_with(self.acceleration(None)) || self.support.is_some()
+        self.acts_with(self.acceleration(None))
+            || self.support.is_some()
+            || !self.supports.is_empty()
     }
 
     pub(super) fn acts_with(&self, acceleration: [f32; 3]) -> bool {
@@ -164,6 +170,8 @@ pub struct Acting {
     pub(super) acts: bool,
     /// The support, where the host gives one.
     pub(super) carried: Option<Carried>,
+    /// The support groups; empty where all are as they were meshed.
+    pub(super) supports: Vec<GroupState>,
 }
 
 impl Acting {
@@ -175,6 +183,7 @@ impl Acting {
             pushed: Vec::new(),
             acts: false,
             carried: None,
+            supports: Vec::new(),
         })
     }
 
@@ -185,11 +194,13 @@ impl Acting {
         self.pushed.clear();
         self.acts = false;
         self.carried = None;
+        self.supports.clear();
     }
 
     /// A copy, where anything acts.
     pub(super) fn copy(&self) -> Result<Option<Acting>> {
-        if !self.acts && self.carried.is_none() && self.pushed.is_empty() {
+        let is_at_rest = self.carried.is_none() && self.supports.is_empty();
+        if !self.acts && is_at_rest && self.pushed.is_empty() {
             return Ok(None);
         }
         Ok(Some(Acting {
@@ -199,6 +210,7 @@ impl Acting {
             pushed: memory::copied(&self.pushed, WHAT)?,
             acts: self.acts,
             carried: self.carried,
+            supports: self.supports.clone(),
         }))
     }
 
@@ -212,6 +224,7 @@ impl Acting {
         if self.carried.is_some_and(|carried| !carried.is_sound()) {
             return Err(Error::Snapshot("the support's motion is damaged".into()));
         }
+        supports::admit(&self.supports, &mesh.supports)?;
         stored::check(&self.pascal, mesh.surface_faces.len() / 3 + 1)
     }
 }

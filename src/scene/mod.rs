@@ -46,6 +46,7 @@ mod snapshot;
 mod state;
 mod step_input;
 mod support;
+mod supports;
 mod ties;
 mod timing;
 mod tissue;
@@ -66,6 +67,7 @@ pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub use published::View;
 pub use step_input::{Contact, Progress, StepInput};
 pub use support::SupportPose;
+pub use supports::{GroupMotion, MAX_SUPPORTS};
 pub(crate) use tools::Lists;
 
 use crate::bundle::Mesh;

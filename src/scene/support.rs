@@ -35,9 +35,9 @@ impl SupportPose {
 }
 
 /// `[R c]` by rows, mm; and its rates.
-type Affine = [[f64; 4]; 3];
+pub(super) type Affine = [[f64; 4]; 3];
 
-fn affine(pose: &Pose) -> Affine {
+pub(super) fn affine(pose: &Pose) -> Affine {
     // In f64: accelerations are second differences of it.
     let raw = pose.rotation.to_array().map(f64::from);
     let size = raw.iter().map(|x| x * x).sum::<f64>().sqrt();

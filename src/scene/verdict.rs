@@ -116,8 +116,12 @@ impl Core {
         }
         let would_repeat = self.incoming.is_empty() && !was_given;
         if policy == GuardPolicy::Blend || would_repeat {
-            match self.cut.is_some() {
-                // The linear response is the intact body's, and inverts loose lips: the last good state stays.
+            let leads = self
+                .loads
+                .as_ref()
+                .is_some_and(|loads| loads.held.is_some());
+            match self.cut.is_some() || leads {
+                // The linear response is the intact body's at rest, and inverts loose lips: the last good state stays.
                 true => (self.next.field).copy_from_slice(&lock_read(published).last.field),
                 false => self.fall_back()?,
             }

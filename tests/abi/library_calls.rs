@@ -103,6 +103,26 @@ impl World<'_> {
                     );
                     ("upt_model_indices", status)
                 }
+                Function::ModelSupport => {
+                    let mut name = [0 as std::ffi::c_char; 32];
+                    let (mut nodes, mut needed) = ([0u32; 64], 0u64);
+                    let group = if wrong {
+                        u32::MAX
+                    } else {
+                        call.seed as u32 % 3
+                    };
+                    let (capacity, _) = count(nodes.len() - 1, call.size);
+                    let status = upt_model_support(
+                        model,
+                        group,
+                        pointer_mut(&mut name, call, 0),
+                        32,
+                        pointer_mut(&mut nodes, call, 1),
+                        capacity.min(nodes.len() as u64),
+                        pointer_mut(std::slice::from_mut(&mut needed), call, 2),
+                    );
+                    ("upt_model_support", status)
+                }
                 Function::SceneCreate => (
                     "upt_scene_create",
                     self.scene_create(call, model, model_nodes),

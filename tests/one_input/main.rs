@@ -9,10 +9,12 @@
 mod beds;
 #[path = "../fixture/mod.rs"]
 mod fixture;
+mod groups;
 #[path = "../host/mod.rs"]
 mod host;
 mod loads;
 mod mistakes;
+mod mobilise;
 mod supports;
 mod ties;
 

@@ -246,7 +246,7 @@ export const upt_scene_stats = {
   },
 };
 export const upt_input = {
-  size: 144,
+  size: 160,
   fields: {
     struct_size: ["Uint32", 0, 1],
     reserved: ["Uint8", 4, 4],
@@ -263,11 +263,13 @@ export const upt_input = {
     pressure_count: ["BigUint64", 64, 1],
     ties: ["Uint32", 72, 1],
     tie_count: ["BigUint64", 80, 1],
-    gravity: ["Float32", 88, 3],
-    gravity_at_rest: ["Float32", 100, 3],
-    support_position: ["Float32", 112, 3],
-    support_rotation: ["Float32", 124, 4],
-    reserved_end: ["Uint8", 140, 4],
+    supports: ["Uint32", 88, 1],
+    support_count: ["BigUint64", 96, 1],
+    gravity: ["Float32", 104, 3],
+    gravity_at_rest: ["Float32", 116, 3],
+    support_position: ["Float32", 128, 3],
+    support_rotation: ["Float32", 140, 4],
+    reserved_end: ["Uint8", 156, 4],
   },
 };
 export const upt_pressure = {
@@ -404,5 +406,18 @@ export const upt_surface = {
     triangle_count: ["BigUint64", 16, 1],
     first_vertex: ["BigUint64", 24, 1],
     changed_count: ["BigUint64", 32, 1],
+  },
+};
+export const upt_support = {
+  size: 56,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    group: ["Uint32", 4, 1],
+    position: ["Float32", 8, 3],
+    rotation: ["Float32", 20, 4],
+    let_go: ["Uint8", 36, 1],
+    reserved: ["Uint8", 37, 3],
+    displacements: ["Uint32", 40, 1],
+    displacement_count: ["BigUint64", 48, 1],
   },
 };

@@ -9,11 +9,12 @@ use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
 pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
-pub const FILES: [&str; 18] = [
+pub const FILES: [&str; 19] = [
     "../status.rs",
     "constants.rs",
     "structs.rs",
     "step_structs.rs",
+    "support_structs.rs",
     "library.rs",
     "model.rs",
     "scene.rs",

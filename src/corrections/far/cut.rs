@@ -134,7 +134,7 @@ impl FarField {
             }
             let node = same[0].0;
             let matters = sum.iter().any(|value| value.abs() > 1e-5 * largest);
-            if matters && !packed.body.held[node as usize] {
+            if matters && !packed.body.held.is[node as usize] {
                 memory::push(&mut self.nodes, node, WHAT)?;
                 memory::push(&mut self.weights, sum.map(|value| value as f32), WHAT)?;
             }

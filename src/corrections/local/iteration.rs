@@ -96,7 +96,7 @@ impl LocalSolver {
         let env = step.context.env();
         let (p, mut is_known) = (&mut self.reduced.p, true);
         problem.each_load(
-            |node, force| match env.prior.column_for(&env.body.held, node) {
+            |node, force| match env.prior.column_for(&env.held.is, node) {
                 Some((column, true)) => {
                     for (axis, force) in force.to_array().into_iter().enumerate() {
                         add(-1e3 * force, env.space.at_contact(3 * column + axis), p);
@@ -113,7 +113,7 @@ impl LocalSolver {
         resize(field, 3 * near.free)?;
         each_load(problem, near, |place, force| {
             let node = near.nodes[place / 3];
-            if !matches!(env.prior.column_for(&env.body.held, node), Some((_, true))) {
+            if !matches!(env.prior.column_for(&env.held.is, node), Some((_, true))) {
                 add(1.0, &force, &mut field[place..]);
             }
         });
@@ -186,7 +186,7 @@ impl LocalSolver {
         let compliance = Compliance {
             tangent: Some(&response),
             prior: step.context.prior,
-            held: &env.body.held,
+            held: &env.held.is,
             inertia: Some((env.space, step.preconditioner.inertial_compliance())),
         };
         let change = problem.solve(compliance, state, way)?;

@@ -204,6 +204,10 @@ impl LocalSolver {
         let rest = step.input.rest;
         self.about.clear();
         add_centres(rest, &step.context.corrections.changed, &mut self.about)?;
+        // What a group held is as near as what a tool touches: no mode of the bundle moves it.
+        for group in step.context.let_go_groups() {
+            add_centres(rest, &group.nodes, &mut self.about)?;
+        }
         add_centres(rest, &self.touched, &mut self.about)?;
         let pairs = &self.pairs;
         let abouts = pairs.records().map(|record| record.about.as_slice());

@@ -172,7 +172,7 @@ impl NearSet {
         let rank = |node: u32| {
             let at = node as usize;
             let whole = self.counts[at] == far.elements_at[at];
-            (env.body.held[at], !whole, !self.is_reached[at], node)
+            (env.held.is[at], !whole, !self.is_reached[at], node)
         };
         self.nodes.sort_unstable_by_key(|node| rank(*node));
         for (place, &node) in self.nodes.iter().enumerate() {

@@ -50,6 +50,7 @@ impl Bench {
             prior: &self.prior,
             corrections: &self.corrections,
             time_step: &self.corrections.time_step,
+            held: &self.corrections.body.held,
         }
     }
 
@@ -82,7 +83,7 @@ impl Bench {
         let mut field = self.zero.clone();
         preconditioner.take_coordinates(env, &c).unwrap();
         preconditioner.decode(env, &mut field).unwrap();
-        crate::corrections::precondition::mask_held(&env.body.held, &mut field);
+        crate::corrections::precondition::mask_held(&env.held.is, &mut field);
         let largest = field.iter().fold(0.0f32, |most, u| most.max(u.abs()));
         let factor = size_mm / largest;
         c.iter_mut().for_each(|c| *c *= factor);

@@ -26,6 +26,10 @@ impl Preconditioner {
         has_load: bool,
     ) -> Result<()> {
         self.has_load = has_load;
+        if self.let_go != env.held.let_go {
+            self.let_go = env.held.let_go;
+            self.whole = None;
+        }
         if let (true, Some(modes), None) = (has_load, env.whole, &self.whole) {
             let kappa = env.time_step.integrator.kappa();
             let made = WholeSolve::new(env.compute(), modes, env.space, kappa)?;
@@ -60,7 +64,7 @@ impl Preconditioner {
         accumulate_rows(env.isa, env.pool, phi, rows, &self.solved, false, q)?;
         decode_rows(env.isa, env.pool, &basis, &self.plan, q, scratch)?;
         own.add(env.compute(), modes, scratch)?;
-        mask_held(&env.body.held, scratch);
+        mask_held(&env.held.is, scratch);
         u.iter_mut().zip(&*scratch).for_each(|(u, z)| *u -= z);
         Ok(())
     }

@@ -75,7 +75,7 @@ impl Preconditioner {
         let isa = env.isa;
         let mut slot = 0;
         for (index, &node) in self.nodes.iter().enumerate() {
-            if !matches!(env.prior.column_for(&env.body.held, node), Some((_, true))) {
+            if !matches!(env.prior.column_for(&env.held.is, node), Some((_, true))) {
                 continue;
             }
             let target = target(index);
@@ -192,7 +192,7 @@ impl Preconditioner {
         accumulate_rows(isa, pool, modes, rows, y, false, q)?;
         let basis = env.prior.basis();
         decode_rows(isa, pool, &basis, &self.plan, q, out)?;
-        mask_held(&env.body.held, out);
+        mask_held(&env.held.is, out);
         Ok(())
     }
 
@@ -207,7 +207,7 @@ impl Preconditioner {
             &self.coordinates,
             scratch,
         )?;
-        mask_held(&env.body.held, scratch);
+        mask_held(&env.held.is, scratch);
         for (u, change) in u.iter_mut().zip(&*scratch) {
             *u += change;
         }

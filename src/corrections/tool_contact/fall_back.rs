@@ -73,6 +73,7 @@ impl ImplicitSolver {
     ) -> Result<()> {
         problem.start_from_rest(input.rest);
         at.u.fill(0.0);
+        self.lift(context, input, None, at.u)?;
         self.preconditioner.coordinates.fill(0.0);
         let from_rest = Input {
             last: &[],

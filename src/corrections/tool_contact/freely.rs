@@ -21,6 +21,7 @@ impl ImplicitSolver {
         problem.restart();
         at.u.copy_from_slice(input.last);
         self.add_gravity(context, input, at.u)?;
+        self.lift(context, input, Some(input.last), at.u)?;
         self.move_freely(env)?;
         self.settle(env, at.u)?;
         report.parts = 1;

@@ -111,7 +111,7 @@ impl ImplicitSolver {
                 return Ok(());
             }
             let holds = (self.local.as_ref())
-                .is_none_or(|local| local.holds_loads(problem, &context.env().body.held));
+                .is_none_or(|local| local.holds_loads(problem, &context.env().held.is));
             if !holds || made.iterations - first == ROUND {
                 made.is_enough = false;
                 return Ok(());
@@ -129,7 +129,7 @@ impl ImplicitSolver {
         at: &Iterate<'_>,
     ) -> Result<()> {
         let env = context.env();
-        let nodes = problem.reached(&env.body.held);
+        let nodes = problem.reached(&env.held.is);
         let level = self.motion.level as usize;
         let (local, mut step) = self.local_solver(context, input)?;
         local.level = level;
@@ -152,14 +152,15 @@ impl ImplicitSolver {
         let mut q = std::mem::take(&mut self.q);
         let (local, mut step) = self.local_solver(context, input)?;
         let mut result = local.settle(&mut step, at.g, &mut q, at.u);
-        if input.load.is_some() && result.is_ok() {
+        // What has been let go has moved before them, and is near.
+        if input.load.is_some() && context.held.let_go == 0 && result.is_ok() {
             // What loads do far from the tools is not in the span of the iterations; what the tools push with is balanced in them.
             problem.each_load(|node, force| {
                 let rows = at.g[3 * node as usize..].iter_mut();
                 rows.zip(force.to_array())
                     .for_each(|(g, force)| *g -= 1e3 * force);
             });
-            mask_held(&context.env().body.held, at.g);
+            mask_held(&context.env().held.is, at.g);
             let env = context.env();
             result = self.preconditioner.move_whole(env, at.g, &mut q, at.u);
         }

@@ -326,7 +326,8 @@ impl Between {
         for ((out, &node), moved) in nodes.zip(view.moved.as_chunks::<3>().0) {
             let free = &self.free.as_chunks::<3>().0[node as usize];
             *out = match (self.held[node as usize], moves) {
-                (true, _) => [0.0; 3],
+                // It goes on as it went: on, or nowhere.
+                (true, _) => *free,
                 (false, Some(_)) => std::array::from_fn(|k| free[k] + moved[k]),
                 (false, None) => *free,
             };

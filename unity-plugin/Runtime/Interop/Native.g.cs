@@ -354,6 +354,13 @@ namespace Upt.Interop
         public upt_tie* ties;
         /// <summary>At most 256.</summary>
         public ulong tie_count;
+        /// <summary>
+        /// `[support_count]`: what support groups of the bundle do, each at most once, all with the same `struct_size`. A group that is not named is held where it was
+        /// meshed, or where it was held again. Pass them in every step.
+        /// </summary>
+        public upt_support* supports;
+        /// <summary>At most 64.</summary>
+        public ulong support_count;
         /// <summary>Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.</summary>
         public fixed float gravity[3];
         /// <summary>Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.</summary>
@@ -602,6 +609,28 @@ namespace Upt.Interop
         public ulong first_vertex;
         /// <summary>Slots whose corners have changed.</summary>
         public ulong changed_count;
+    }
+
+    /// <summary>What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_support` names the groups.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_support
+    {
+        /// <summary>`sizeof(upt_support)`, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>Its place among the bundle's groups, from 0.</summary>
+        public uint group;
+        /// <summary>As a rigid body in the mesh's frame: a node `x` of the group ends at `R x + position`, mm; at most 40 mm from where it is.</summary>
+        public fixed float position[3];
+        /// <summary>`R` as a unit quaternion x, y, z, w; all zero: none.</summary>
+        public fixed float rotation[4];
+        /// <summary>1: the group holds nothing, and its nodes move as all free ones do. Held again, it holds them where they are then. 0: it holds.</summary>
+        public byte let_go;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[3];
+        /// <summary>`[n,3]`, mm, instead of a pose: the displacement of each of the group's nodes at the end of the step; NULL: the pose.</summary>
+        public float* displacements;
+        /// <summary>3 n, or 0.</summary>
+        public ulong displacement_count;
     }
 
     /// <summary>The C ABI, as it is.</summary>
@@ -942,6 +971,21 @@ namespace Upt.Interop
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern int upt_model_indices(IntPtr model, int set, uint* @out, ulong capacity, ulong* needed);
+
+        /// <summary>
+        /// Names a support group of a bundle, and copies its nodes: what `upt_input.supports` moves.
+        ///
+        /// - `group`: from 0; the groups end where this is `UPT_ERR_ARGUMENT` (`upt_model_describe` lists them).
+        /// - `name`: receives text with its NUL; NULL with capacity 0 leaves it out.
+        /// - `nodes`: node indices, ascending; NULL with capacity 0 only queries the size.
+        /// - `node_capacity`: number of indices that fit in `nodes`.
+        /// - `needed`: number of nodes of the group, always written; may be NULL.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such group, a capacity too small).
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_model_support(IntPtr model, uint group, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
 
         /// <summary>
         /// Creates a scene at rest.
