@@ -9,6 +9,7 @@ use tissue::mesh_import::{
 };
 use tissue::mesh_quality::{Quality, measure};
 
+use super::fixed;
 use super::options::Options;
 use super::stages::Stage;
 use crate::{foreign, preview};
@@ -23,6 +24,7 @@ const RIM_EDGES: f64 = 1.5;
 /// Writes `mesh.safetensors` with its sets.
 pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
     let (mut mesh, input) = read(options, stage)?;
+    let mut groups = Vec::new();
     check_length(&mesh, options)?;
     let scale = options.scale()?;
     let open = |regions: &[Region]| -> Result<Vec<Opened>, ImportError> {
@@ -32,7 +34,13 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
             .collect()
     };
     if !options.fixed.is_empty() {
-        mesh.fixed = nodes_in(&mesh, &open(&options.fixed)?);
+        let held: Vec<Vec<u32>> = (options.fixed.iter())
+            .map(|fixed| Ok(nodes_in(&mesh, &[fixed.region.open(&input, scale)?])))
+            .collect::<Result<_, ImportError>>()?;
+        mesh.fixed = held.concat();
+        mesh.fixed.sort_unstable();
+        mesh.fixed.dedup();
+        groups = fixed::groups(&options.fixed, &held)?;
         mesh.supported.clear();
         if mesh.fixed.is_empty() {
             bail!(
@@ -76,6 +84,14 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
     let path = stage.folder.join("mesh.safetensors");
     mesh.write(&path)
         .with_context(|| format!("{}: cannot be written", path.display()))?;
+    fixed::write(&groups, &stage.folder)?;
+    for group in &groups {
+        stage.decided(&format!(
+            "support group `{}`: {} nodes",
+            group.name,
+            group.nodes.len()
+        ));
+    }
     let quality = measure(&mesh);
     stage.decided(&format!(
         "{} nodes, {} tetrahedra, {:.1} ml, {}; {} nodes held; {} of {} mm² of surface may be touched",

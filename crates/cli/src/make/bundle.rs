@@ -115,6 +115,7 @@ pub fn assemble(
             "prior",
             json!({"file": "prior.safetensors", "vibration": "vibration.safetensors"}),
         ),
+        ("supports", json!(super::fixed::read(work)?)),
         (
             "provenance",
             json!({"command": COMMAND, "version": env!("CARGO_PKG_VERSION"), "options": options.words(), "seed": options.seed}),
@@ -123,8 +124,11 @@ pub fn assemble(
         ("files", Value::Object(files)),
         (DIGEST, json!(blank)),
     ];
+    // A bundle without groups is one that libraries before them read.
+    let is_told = |(name, value): &&(&str, Value)| *name != "supports" || *value != json!([]);
     let lines: Vec<String> = entries
         .iter()
+        .filter(is_told)
         .map(|(name, value)| {
             let text = serde_json::to_string_pretty(value)?.replace('\n', "\n  ");
             Ok(format!("  \"{name}\": {text}"))

@@ -14,6 +14,7 @@ mod bundle;
 mod certify;
 mod clock;
 mod emit;
+mod fixed;
 mod learn;
 mod options;
 mod patches;
@@ -62,9 +63,12 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         );
     }
     let body_key = key_of(&[&input, options.body_words()?.as_bytes()]);
-    let made = work.stage("body", &body_key, &["mesh.safetensors"], |stage| {
-        body::make(options, stage)
-    });
+    let made = work.stage(
+        "body",
+        &body_key,
+        &["mesh.safetensors", fixed::FILE],
+        |stage| body::make(options, stage),
+    );
     let body = match made {
         Ok(body) => body,
         Err(error) => {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::fixed::Fixed;
 use anyhow::{Result, bail};
 use clap::Args;
 use elements::{Law, Material};
@@ -54,9 +55,9 @@ pub struct Options {
     pub part: Option<String>,
     /// Region whose nodes are held: ball:x,y,z,r, plane:a,b,c,d (where a x + b y + c z + d > 0), inside:FILE (a closed surface in the input's
     /// unit), group:NAME (a group, material or #rrggbb colour of the input), or not: before one of these. May be repeated. Default: what the
-    /// mesh file holds.
-    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
-    pub fixed: Vec<Region>,
+    /// mesh file holds. With NAME= before it the nodes are a support group, which a host moves and lets go apart; of several, a node is the first one's.
+    #[arg(long, value_name = "[NAME=]REGION", allow_hyphen_values = true)]
+    pub fixed: Vec<Fixed>,
     /// Node sets of a mesh file that are held: `fixed`, or `supported` (both sets; not together with --fixed).
     #[arg(long, default_value = "fixed")]
     pub boundary: Boundary,
@@ -272,12 +273,11 @@ impl Options {
             self.refill,
             self.boundary.as_str()
         );
-        let stiffer = self.stiffness.iter().map(|(region, _)| region);
         words += &format!(" {:?}", self.stiffness);
-        for region in (self.fixed.iter().chain([&Region::All]))
-            .chain(&self.domain)
-            .chain(stiffer)
-        {
+        words += &format!(" {:?}", self.fixed);
+        let held = self.fixed.iter().map(|fixed| &fixed.region);
+        let regions = held.chain([&Region::All]).chain(&self.domain);
+        for region in regions.chain(self.stiffness.iter().map(|(region, _)| region)) {
             words += &format!(" {region}");
             let mut inner = region;
             while let Region::Not(next) = inner {
@@ -296,7 +296,7 @@ impl Options {
             |regions: &[Region]| -> Vec<String> { regions.iter().map(Region::to_string).collect() };
         json!({
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
-            "boundary": self.boundary.as_str(), "fixed": list(&self.fixed), "domain": list(&self.domain), "nodes": self.nodes,
+            "boundary": self.boundary.as_str(), "fixed": self.fixed.iter().map(Fixed::to_string).collect::<Vec<String>>(), "domain": list(&self.domain), "nodes": self.nodes,
             "part": self.part, "label": self.label, "refill": self.refill,
             "material": self.material, "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 /// Names the layout of what stages write; a change makes all of them anew.
-const LAYOUT: &str = "upt make 4";
+const LAYOUT: &str = "upt make 5";
 
 /// SHA-256 of the parts, each with its length before it.
 pub fn key_of(parts: &[&[u8]]) -> String {
