@@ -7,7 +7,8 @@ use ::contact::{Body, Pose, Samples, Vector};
 
 use super::state::State;
 use crate::bundle::Mesh;
-use crate::memory::HeldBytes;
+use crate::error::Result;
+use crate::memory::{self, HeldBytes};
 
 /// A tool whose middle lies less deep than this, or than its half thickness, is in contact and not in the tissue, mm.
 const LEAST_MM: f32 = 1.0;
@@ -17,6 +18,23 @@ const PIERCED_MM: f32 = 4.0;
 const LONGEST_MM: f32 = 30.0;
 /// A unit direction along no axis or diagonal.
 const OBLIQUE: Vector = Vector::new(0.365_148, 0.547_723, 0.752_773);
+
+/// On which sides of two planes through a ray each node of the surface lies, by node: bits for above and below the one, and for above and below
+/// the other. Faces whose corners share a bit are not crossed.
+#[derive(Debug, HeldBytes)]
+pub(super) struct Sides(Vec<u8>);
+
+impl Sides {
+    /// Of a mesh with `count` nodes.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(count: usize) -> Result<Sides> {
+        let mut sides = memory::room(count, "the sides of a ray")?;
+        sides.resize(count, 0);
+        Ok(Sides(sides))
+    }
+}
 
 /// Where a tool in the tissue comes out.
 #[derive(Clone, Copy, Debug, HeldBytes)]
@@ -33,11 +51,18 @@ pub(super) struct Buried {
 
 impl Buried {
     /// The way from the deepest probe out of the solid along a unit direction, mm; none where it is longer than [`LONGEST_MM`].
-    pub fn way_along(&self, direction: Vector, mesh: &Mesh, state: State<'_>) -> Option<Vector> {
+    pub fn way_along(
+        &self,
+        direction: Vector,
+        mesh: &Mesh,
+        state: State<'_>,
+        sides: &mut Sides,
+    ) -> Option<Vector> {
         // A direction along edges of a regular mesh would hit none of the faces there.
         let tilted = (direction + 1e-3 * OBLIQUE).normalize();
         let mut length = f32::MAX;
-        each_crossing(self.point, tilted, mesh, state, |along, leaves| {
+        let ray = (self.point, tilted);
+        each_crossing(ray, mesh, state, sides, |along, leaves| {
             if leaves {
                 length = length.min(along);
             }
@@ -58,11 +83,13 @@ impl Buried {
         samples: &Samples,
         mesh: &Mesh,
         state: State<'_>,
+        sides: &mut Sides,
     ) -> Option<Buried> {
         let buried = deepest(body, pose, samples, state, LEAST_MM.min(body.size()))?;
         let point = buried.point;
-        (is_touchable(point, buried.depth, mesh, state) && is_inside(point, mesh, state))
-            .then_some(buried)
+        let is_in =
+            is_touchable(point, buried.depth, mesh, state) && is_inside(point, mesh, state, sides);
+        is_in.then_some(buried)
     }
 }
 
@@ -163,36 +190,38 @@ fn is_touchable(point: Vector, depth: f32, mesh: &Mesh, state: State<'_>) -> boo
 }
 
 /// Whether a ray from a point leaves the surface more often than it enters it.
-fn is_inside(point: Vector, mesh: &Mesh, state: State<'_>) -> bool {
+fn is_inside(point: Vector, mesh: &Mesh, state: State<'_>, sides: &mut Sides) -> bool {
     let mut leaves = 0i32;
-    each_crossing(point, OBLIQUE, mesh, state, |_, out| {
+    each_crossing((point, OBLIQUE), mesh, state, sides, |_, out| {
         leaves += if out { 1 } else { -1 };
     });
     leaves != 0
 }
 
-/// Calls with how far along a ray it crosses a face of the whole surface, mm, and whether it leaves the solid there.
+/// Calls with how far along a ray from a point it crosses a face of the whole surface, mm, and whether it leaves the solid there.
 fn each_crossing(
-    point: Vector,
-    ray: Vector,
+    (point, ray): (Vector, Vector),
     mesh: &Mesh,
     state: State<'_>,
+    sides: &mut Sides,
     mut take: impl FnMut(f32, bool),
 ) {
     let across = frame(ray);
     let (e, f) = (across.y_axis, across.z_axis);
-    // Most faces lie on one side of a plane through the ray.
+    for &node in &mesh.surface_nodes {
+        let at = state.position(node) - point;
+        let side = |x: f32| u8::from(x > 0.0) | u8::from(x < 0.0) << 1;
+        sides.0[node as usize] = side(at.dot(e)) | side(at.dot(f)) << 2;
+    }
     let is_beside = |at: [f32; 3]| at.iter().all(|x| *x > 0.0) || at.iter().all(|x| *x < 0.0);
     for face in mesh.surface_faces.as_chunks::<3>().0 {
+        // Most faces lie on one side of a plane through the ray.
+        let [a, b, c] = face.map(|node| sides.0[node as usize]);
+        if a & b & c != 0 {
+            continue;
+        }
         let corners = face.map(|node| state.position(node) - point);
-        let x = corners.map(|corner| corner.dot(e));
-        if is_beside(x) {
-            continue;
-        }
-        let y = corners.map(|corner| corner.dot(f));
-        if is_beside(y) {
-            continue;
-        }
+        let [x, y] = [e, f].map(|axis| corners.map(|corner| corner.dot(axis)));
         let side = |i: usize, j: usize| x[i] * y[j] - y[i] * x[j];
         let [u, v, w] = [side(1, 2), side(2, 0), side(0, 1)];
         let is_hit = is_beside([u, v, w]);

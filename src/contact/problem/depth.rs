@@ -19,10 +19,11 @@ impl ContactProblem {
     }
 
     /// How deep a tool lies in the tissue, mm; 0 where it does not.
-    fn buried_by(&self, index: usize, state: State<'_>, part: f32) -> f32 {
+    fn buried_by(&mut self, index: usize, state: State<'_>, part: f32) -> f32 {
         let tool = &self.tools[index];
         let pose = pose::between(&self.before[index], &tool.pose, part);
-        let found = Buried::find(&tool.body, &pose, &self.samples, &self.mesh, state);
+        let (samples, mesh, sides) = (&self.samples, &self.mesh, &mut self.sides);
+        let found = Buried::find(&tool.body, &pose, samples, mesh, state, sides);
         found.map_or(0.0, |buried| buried.depth + tool.body.radius())
     }
 
@@ -140,8 +141,8 @@ impl ContactProblem {
             start: &[],
         };
         for (index, tool) in self.tools.iter().enumerate() {
-            let (samples, mesh) = (&self.samples, &self.mesh);
-            let found = Buried::find(&tool.body, &tool.pose, samples, mesh, state);
+            let (samples, mesh, sides) = (&self.samples, &self.mesh, &mut self.sides);
+            let found = Buried::find(&tool.body, &tool.pose, samples, mesh, state, sides);
             let clear = tool.body.size() + OPEN_MM;
             let came = self.before[index].translation - tool.pose.translation;
             let own = self.past.forces.iter();
@@ -154,7 +155,7 @@ impl ContactProblem {
             };
             let way = found.map_or(Vector::ZERO, |buried| {
                 let back = came.try_normalize();
-                let back = back.and_then(|back| buried.way_along(back, mesh, state));
+                let back = back.and_then(|back| buried.way_along(back, mesh, state, sides));
                 let way = back.unwrap_or(buried.out * buried.depth);
                 way + way.normalize_or_zero() * clear
             });

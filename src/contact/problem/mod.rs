@@ -22,7 +22,7 @@ use ::contact::{Contact, Pose, Sample, Samples, Search, Sweeps, Vector};
 pub use solve::Change;
 use tie_set::TieSet;
 
-use super::buried::Buried;
+use super::buried::{Buried, Sides};
 use super::compliance::Delassus;
 use super::inertial_compliance::InertialCompliance;
 use super::past::{Force, Held, Past};
@@ -70,6 +70,8 @@ pub struct ContactProblem {
     trusted: Vec<f32>,
     /// For each that lay in the tissue when the step began, the shortest way out.
     buried: Vec<Option<Buried>>,
+    /// Room for rays through the surface.
+    sides: Sides,
     tied: TieSet,
     /// At the end of the last published step.
     pub past: Past,
@@ -128,6 +130,7 @@ impl ContactProblem {
             may_lose: memory::room(MAX_TOOLS, WHAT)?,
             trusted: memory::room(MAX_TOOLS, WHAT)?,
             buried: memory::room(MAX_TOOLS, WHAT)?,
+            sides: Sides::new(mesh.node_count())?,
             tied: TieSet::default(),
             past: Past::with_room(room)?,
             next: Past::with_room(room)?,
@@ -259,8 +262,8 @@ impl ContactProblem {
             self.before.push(from);
             self.put.push(moved.is_none());
             self.has_leapt |= known.is_some() && moved.is_none();
-            let (samples, mesh) = (&self.samples, &self.mesh);
-            let buried = Buried::find(&tool.body, &from, samples, mesh, state);
+            let (samples, mesh, sides) = (&self.samples, &self.mesh, &mut self.sides);
+            let buried = Buried::find(&tool.body, &from, samples, mesh, state, sides);
             self.buried.push(buried);
             let is_quick = tool.body.motion(&from, &tool.pose) > QUICK_MM;
             let is_broad = tool.body.is_broad();
