@@ -90,6 +90,28 @@ namespace Upt.Interop
             }
         }
 
+        /// <summary>Node indices of a support group, ascending: what <see cref="StepInput.SupportGroups"/> moves. Groups count
+        /// from 0; their names are in <see cref="Describe"/>, under <c>supports</c>.</summary>
+        public uint[] SupportNodes(int group)
+        {
+            bool added = false;
+            handle.DangerousAddRef(ref added);
+            try
+            {
+                IntPtr model = handle.DangerousGetHandle();
+                ulong needed = 0;
+                Status.Check(Native.upt_model_support(model, checked((uint)group), null, 0, null, 0, &needed));
+                uint[] nodes = new uint[needed];
+                fixed (uint* pointer = nodes)
+                    Status.Check(Native.upt_model_support(model, (uint)group, null, 0, pointer, needed, &needed));
+                return nodes;
+            }
+            finally
+            {
+                handle.DangerousRelease();
+            }
+        }
+
         /// <summary>JSON: the bundle's name and hash, the provider of each stage and why others were not
         /// taken.</summary>
         public string Describe()

@@ -54,8 +54,9 @@ namespace Upt.Interop
             IntPtr scene = Enter();
             try
             {
-                upt_pressure* p = stackalloc upt_pressure[PinnedPressures.Most];
-                using (PinnedPressures pins = new PinnedPressures(input.Pressures, p))
+                upt_pressure* p = stackalloc upt_pressure[PinnedLists.MostPressures];
+                upt_support* g = stackalloc upt_support[PinnedLists.MostGroups];
+                using (PinnedLists pins = new PinnedLists(input, p, g))
                 fixed (upt_instrument* i = input.Instruments)
                 fixed (uint* n = input.ContactNodes)
                 fixed (float* v = input.ContactVectors)
@@ -64,7 +65,7 @@ namespace Upt.Interop
                 fixed (float* f = input.Forces)
                 fixed (upt_tie* t = input.Ties)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t, g);
                     Status.Check(Native.upt_scene_present(scene, &raw, when, &shown, output, checked((ulong)floats)));
                 }
             }

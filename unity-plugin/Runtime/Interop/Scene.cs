@@ -71,8 +71,9 @@ namespace Upt.Interop
             IntPtr scene = Enter();
             try
             {
-                upt_pressure* p = stackalloc upt_pressure[PinnedPressures.Most];
-                using (PinnedPressures pins = new PinnedPressures(input.Pressures, p))
+                upt_pressure* p = stackalloc upt_pressure[PinnedLists.MostPressures];
+                upt_support* g = stackalloc upt_support[PinnedLists.MostGroups];
+                using (PinnedLists pins = new PinnedLists(input, p, g))
                 fixed (upt_instrument* i = input.Instruments)
                 fixed (uint* n = input.ContactNodes)
                 fixed (float* v = input.ContactVectors)
@@ -82,7 +83,7 @@ namespace Upt.Interop
                 fixed (upt_tie* t = input.Ties)
                 fixed (float* o = output)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t, g);
                     Status.Check(Native.upt_scene_step(scene, &raw, o, Length(output)));
                 }
             }
@@ -106,8 +107,9 @@ namespace Upt.Interop
             IntPtr scene = Enter();
             try
             {
-                upt_pressure* p = stackalloc upt_pressure[PinnedPressures.Most];
-                using (PinnedPressures pins = new PinnedPressures(input.Pressures, p))
+                upt_pressure* p = stackalloc upt_pressure[PinnedLists.MostPressures];
+                upt_support* g = stackalloc upt_support[PinnedLists.MostGroups];
+                using (PinnedLists pins = new PinnedLists(input, p, g))
                 fixed (upt_instrument* i = input.Instruments)
                 fixed (uint* n = input.ContactNodes)
                 fixed (float* v = input.ContactVectors)
@@ -116,7 +118,7 @@ namespace Upt.Interop
                 fixed (float* f = input.Forces)
                 fixed (upt_tie* t = input.Ties)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t, g);
                     Status.Check(Native.upt_scene_submit(scene, &raw));
                 }
             }

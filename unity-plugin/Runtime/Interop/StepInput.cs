@@ -76,6 +76,9 @@ namespace Upt.Interop
         /// <summary>Its rotation, a unit quaternion; all zero: it does not move.</summary>
         public (float X, float Y, float Z, float W) SupportRotation;
 
+        /// <summary>What support groups of the bundle do, each at most once and in every step; at most 64.</summary>
+        public SupportGroup[] SupportGroups;
+
         /// <summary>Refuses counts that the arrays do not hold, and fields of another size than <c>[K,3]</c>.</summary>
         internal void Require(int nodeCount)
         {
@@ -86,14 +89,18 @@ namespace Upt.Interop
             RequireField(Collision, nodeCount, "Collision");
             RequireField(Displacement, nodeCount, "Displacement");
             RequireField(Forces, nodeCount, "Forces");
-            if (Pressures != null && Pressures.Length > PinnedPressures.Most)
-                throw new ArgumentException(
-                    "Pressures holds " + Pressures.Length + " entries, at most " + PinnedPressures.Most, "Pressures");
+            RequireMost(Pressures, PinnedLists.MostPressures, "Pressures");
+            RequireMost(SupportGroups, PinnedLists.MostGroups, "SupportGroups");
+            for (int i = 0; SupportGroups != null && i < SupportGroups.Length; i++)
+                if (SupportGroups[i].Group < 0)
+                    throw new ArgumentOutOfRangeException(
+                        "SupportGroups", "SupportGroups[" + i + "].Group is " + SupportGroups[i].Group + ", must be 0 or more");
         }
 
         /// <summary>As the library's struct, with the arrays where they are pinned.</summary>
         internal upt_input Raw(upt_instrument* instruments, uint* nodes, float* vectors, float* collision,
-                               float* displacement, float* forces, upt_pressure* pressures, upt_tie* ties)
+                               float* displacement, float* forces, upt_pressure* pressures, upt_tie* ties,
+                               upt_support* supports)
         {
             upt_input raw = default(upt_input);
             raw.struct_size = (uint)sizeof(upt_input);
@@ -110,6 +117,8 @@ namespace Upt.Interop
             raw.pressure_count = (ulong)(Pressures == null ? 0 : Pressures.Length);
             raw.ties = ties;
             raw.tie_count = (ulong)(Ties == null ? 0 : Ties.Length);
+            raw.supports = supports;
+            raw.support_count = (ulong)(SupportGroups == null ? 0 : SupportGroups.Length);
             raw.gravity[0] = Gravity.X;
             raw.gravity[1] = Gravity.Y;
             raw.gravity[2] = Gravity.Z;
@@ -131,6 +140,13 @@ namespace Upt.Interop
             if (count < 0 || count > room)
                 throw new ArgumentOutOfRangeException(
                     parameter, parameter + " is " + count + ", the arrays hold " + room + " entries");
+        }
+
+        private static void RequireMost(Array list, int most, string parameter)
+        {
+            if (list != null && list.Length > most)
+                throw new ArgumentException(
+                    parameter + " holds " + list.Length + " entries, at most " + most, parameter);
         }
 
         private static void RequireField(float[] field, int nodeCount, string parameter)
