@@ -65,7 +65,8 @@ structs!(
     upt_instrument_contact,
     upt_cut,
     upt_blade,
-    upt_surface
+    upt_surface,
+    upt_support
 );
 
 fn run(command: &mut Command) -> String {
