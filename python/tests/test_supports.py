@@ -42,3 +42,27 @@ def test_a_group_goes_where_it_is_led_and_is_let_go(tmp_path: Path) -> None:
         assert u[nodes, 2].min() < -0.1
         with pytest.raises(upt.Error, match="group 1 is beyond"):
             scene.step(loads=upt.Loads(supports=[upt.Support(1)]))
+
+
+def test_a_ball_presses_a_body_whose_support_moves() -> None:
+    """What pushes out of balance throws no tissue: some of these steps once went 30 to 900 mm."""
+    model = upt.Model(Path(__file__).parents[2] / "onnx" / "brain-coarse-reduced")
+    rng = np.random.default_rng(5)
+    domain = model.indices(upt.IndexSet.DOMAIN_NODES)
+    away, farthest = 0.0, 0.0
+    with model.scene(corrections=10, threads=1) as scene:
+        for step in range(240):
+            if step % 120 == 0:
+                site = model.positions[domain[rng.integers(len(domain))]]
+                at = site + (0, 0, 10)
+            at = at + 0.1 * (site + rng.normal(0, 3, 3) - at) + rng.normal(0, 0.2, 3)
+            away += rng.normal(0, 0.1)
+            loads = upt.Loads(
+                support=((0, 0, away), (0, 0, 0, 1)),
+                gravity=(0.2, 0, -0.3),
+                pressures=[(None, 10 * np.sin(0.1 * step))],
+            )
+            u = scene.step([upt.Instrument.sphere(4.0, position=tuple(at), friction=0.3)], loads=loads)
+            assert scene.stats.min_det > 0, step
+            farthest = max(farthest, float(np.abs(u).max()))
+    assert 1 < farthest < 15

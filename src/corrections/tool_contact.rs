@@ -16,8 +16,8 @@
 
 mod fall_back;
 mod freely;
-mod let_go;
 mod rounds;
+mod whole;
 
 use super::input::{Input, Report, SolverContext};
 use super::passes;
@@ -157,7 +157,8 @@ impl ImplicitSolver {
         let _span = tracing::trace_span!("guess").entered();
         self.guess_loaded(context, input, problem, at, report)?;
         if context.held.let_go != 0 && at.det > SMALLEST_DET {
-            self.move_let_go(context, input, problem, at, report)?;
+            // No mode of the bundle moves what the group held, and from where it has gone iterations find the rest.
+            self.move_whole(context, input, problem, at, report, 0.0)?;
         }
         self.guess.copy_from_slice(at.u);
         problem.keep_guess()?;
@@ -245,7 +246,7 @@ impl ImplicitSolver {
                     if at.det > SMALLEST_DET {
                         self.begin_round(context, input, problem, at)?;
                         self.improve_at(context, input, problem, at, way)?;
-                        self.end_round(context, input, problem, at)?;
+                        self.end_round(context, input, problem, at, report)?;
                     }
                     self.preconditioner.coordinates.fill(0.0);
                 }

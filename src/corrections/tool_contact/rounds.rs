@@ -6,7 +6,6 @@ use super::{Iterate, is_sound, is_spent, sunk};
 use crate::contact::ContactProblem;
 use crate::corrections::input::{Input, Report, SolverContext};
 use crate::corrections::local::{Base, LocalSolver, StepContext};
-use crate::corrections::precondition::mask_held;
 use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 use crate::memory;
@@ -14,6 +13,8 @@ use crate::memory;
 /// Iterations from one base at most: the far field is that of the base, in all but its clusters.
 const ROUND: u32 = 16;
 
+/// Whole modes may move the tissue so far after the iterations without an evaluation of what that leaves, mm.
+const FAR_MM: f32 = 0.2;
 /// Where an iteration's smallest det F is below this, all elements are evaluated once more where it ends.
 const LOOKED_AT_DET: f32 = 0.5;
 
@@ -51,7 +52,7 @@ impl ImplicitSolver {
         loop {
             self.begin_round(context, input, problem, at)?;
             self.improve_round(context, input, problem, at, (&mut made, report))?;
-            self.end_round(context, input, problem, at)?;
+            self.end_round(context, input, problem, at, report)?;
             let most = input.enough.iterations;
             if made.is_enough || made.iterations >= most || problem.work.is_spent() {
                 break;
@@ -148,24 +149,18 @@ impl ImplicitSolver {
         input: &Input<'_>,
         problem: &ContactProblem,
         at: &mut Iterate<'_>,
+        report: &mut Report,
     ) -> Result<()> {
         let mut q = std::mem::take(&mut self.q);
         let (local, mut step) = self.local_solver(context, input)?;
-        let mut result = local.settle(&mut step, at.g, &mut q, at.u);
-        // What has been let go has moved before them, and is near.
-        if input.load.is_some() && context.held.let_go == 0 && result.is_ok() {
-            // What loads do far from the tools is not in the span of the iterations; what the tools push with is balanced in them.
-            problem.each_load(|node, force| {
-                let rows = at.g[3 * node as usize..].iter_mut();
-                rows.zip(force.to_array())
-                    .for_each(|(g, force)| *g -= 1e3 * force);
-            });
-            mask_held(&context.env().held.is, at.g);
-            let env = context.env();
-            result = self.preconditioner.move_whole(env, at.g, &mut q, at.u);
-        }
+        let result = local.settle(&mut step, at.g, &mut q, at.u);
         self.q = q;
-        result
+        result?;
+        // What loads do far from the tools is not in the span of the iterations. What has been let go has moved before them, and is near.
+        match input.load.is_some() && context.held.let_go == 0 {
+            true => self.move_whole(context, input, problem, at, report, FAR_MM),
+            false => Ok(()),
+        }
     }
 
     /// One local iteration with the tools at part `way` of their way; tells whether it leads to another state.

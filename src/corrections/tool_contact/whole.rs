@@ -1,4 +1,4 @@
-//! The guess of a body of which a support group has been let go.
+//! Modes of the whole body, and of what a support group held, in a step that tools drive.
 
 use super::Iterate;
 use crate::contact::ContactProblem;
@@ -8,19 +8,21 @@ use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 
 impl ImplicitSolver {
-    /// Moves the group's modes by what is out of balance on them, if that leaves less of it: no mode of the bundle moves what the group held, and from where
-    /// the group has gone iterations find the rest.
-    pub(super) fn move_let_go(
+    /// Moves the whole modes by what is out of balance on them. A move of more than `unchecked_mm` is taken back unless it leaves less of that: a tool that has
+    /// lost the balance pushes with more than the body's softest modes bear.
+    pub(super) fn move_whole(
         &mut self,
         context: SolverContext<'_>,
         input: &Input<'_>,
         problem: &ContactProblem,
         at: &mut Iterate<'_>,
         report: &mut Report,
+        unchecked_mm: f32,
     ) -> Result<()> {
         let env = context.env();
         let unbalanced = |g: &[f32], to: &mut Vec<f32>| {
             to.copy_from_slice(g);
+            // What the tools push with is balanced near them.
             problem.each_load(|node, force| {
                 let rows = to[3 * node as usize..].iter_mut();
                 rows.zip(force.to_array())
@@ -31,8 +33,15 @@ impl ImplicitSolver {
         self.with_fields(|solver, [from, scratch, left]| {
             from.copy_from_slice(at.u);
             unbalanced(at.g, left);
-            let before = solver.size(env, left)?;
             (solver.preconditioner).move_whole(env, left, scratch, at.u)?;
+            let moves =
+                at.u.iter()
+                    .zip(&*from)
+                    .map(|(now, from)| (now - from).abs());
+            if moves.fold(0.0, f32::max) <= unchecked_mm {
+                return Ok(());
+            }
+            let before = solver.size(env, left)?;
             solver.evaluate(context, input, at, report)?;
             unbalanced(at.g, left);
             let after = solver.size(env, left)?;
