@@ -2,7 +2,7 @@
 //!
 //! Work is counted and not timed, so that a step has the same bits on every machine; only a host's budget is a time.
 //!
-//! REQ-046: The work of a step is bounded for any poses of tools, and what it left undone is told by a flag.
+//! REQ-046: The work of the contact solves of a step is bounded for any poses of tools, and what they left unsolved is told by a flag.
 
 use crate::clock::Instant;
 use crate::memory::HeldBytes;
