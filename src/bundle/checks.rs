@@ -89,6 +89,9 @@ impl Manifest {
                 "needs a linear response (field `prior`)",
             )?;
         }
+        if let Some(body) = &self.body {
+            check_name(body, "body")?;
+        }
         for (name, entry) in &self.files {
             check_name(name, &format!("files.{name}"))?;
             check(
@@ -181,7 +184,7 @@ impl Manifest {
     }
 }
 
-/// A file of a bundle lies in its folder: one plain name.
+/// A file of a bundle lies in its folder, and its body beside it: one plain name.
 fn check_name(name: &str, field: &str) -> Result<()> {
     let plain =
         !name.is_empty() && !name.contains(['/', '\\', ':', '\0']) && name != "." && name != "..";

@@ -1,6 +1,6 @@
 //! The files of a bundle: read once, size and SHA-256 checked against the manifest.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
@@ -31,11 +31,11 @@ pub struct BundleFiles {
 impl BundleFiles {
     /// Reads `bundle.json` of a folder and checks that each listed file exists with its size.
     pub fn open(folder: &Path) -> Result<BundleFiles> {
-        BundleFiles::at(Place::Folder(folder.to_owned()))
+        BundleFiles::at(Place::folder(folder))
     }
 
     /// The same, wherever the files lie.
-    pub fn at(place: Place) -> Result<BundleFiles> {
+    pub fn at(mut place: Place) -> Result<BundleFiles> {
         let length = place.length(MANIFEST).unwrap_or(0);
         if length > LARGEST_MANIFEST {
             return Err(Error::bundle(
@@ -50,11 +50,18 @@ impl BundleFiles {
             maker::name(error, maker::of(&fields).as_deref())
         })?;
         let made_with = maker::of(&serde_json::from_slice(&bytes).unwrap_or_default());
+        if let Some(body) = &manifest.body {
+            place.take_body(body);
+        }
         for (name, entry) in &manifest.files {
-            let length = place.length(name)?;
+            let length = place.length(name).map_err(|error| match &manifest.body {
+                Some(body) => missing(error, name, body),
+                None => error,
+            })?;
             if length != entry.bytes {
+                let lies = place.of_body(name);
                 let problem = format!(
-                    "has {length} bytes, bundle.json field `files.{name}.bytes` says {}; fetch or make the bundle again",
+                    "{lies}has {length} bytes, bundle.json field `files.{name}.bytes` says {}; fetch or make the bundle again",
                     entry.bytes
                 );
                 let error = Error::bundle(name, problem);
@@ -72,6 +79,11 @@ impl BundleFiles {
     /// Adds the tool that made the bundle to an error about one of its files.
     pub fn name_maker(&self, error: Error) -> Error {
         maker::name(error, self.made_with.as_deref())
+    }
+
+    /// Where a listed file lies: in the bundle's folder or in its body's; none for a bundle in memory.
+    pub fn path(&self, name: &str) -> Option<PathBuf> {
+        self.place.path(name)
     }
 
     /// Whether the manifest lists `name`.
@@ -93,7 +105,8 @@ impl BundleFiles {
             return Err(Error::bundle(
                 name,
                 format!(
-                    "SHA-256 is {digest}, bundle.json field `files.{name}.sha256` says {}; fetch or make the bundle again",
+                    "{}SHA-256 is {digest}, bundle.json field `files.{name}.sha256` says {}; fetch or make the bundle again",
+                    self.place.of_body(name),
                     entry.sha256
                 ),
             ));
@@ -128,6 +141,20 @@ impl BundleFiles {
     /// A listed safetensors file.
     pub fn tensors(&self, name: &str) -> Result<TensorFile> {
         TensorFile::parse(name, self.read(name)?)
+    }
+}
+
+/// Says where a file that a bundle with a body lacks may lie.
+fn missing(error: Error, name: &str, body: &str) -> Error {
+    match error {
+        Error::Io { path, cause } => Error::Io {
+            path,
+            cause: format!(
+                "{cause}; {MANIFEST} field `files` lists `{name}`, and field `body` takes what the bundle lacks from the folder `{body}` beside it: \
+                 keep both side by side, or copy the bundle's files together"
+            ),
+        },
+        other => other,
     }
 }
 

@@ -35,6 +35,7 @@ const KEYS: &[(&str, &[&str])] = &[
             "length_unit",
             "force_unit",
             "boundary",
+            "body",
             "material",
             "mesh",
             "envelope",

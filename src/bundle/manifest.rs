@@ -322,6 +322,8 @@ pub struct Manifest {
     pub force_unit: String,
     /// Held node sets.
     pub boundary: Boundary,
+    /// The folder beside the bundle's own where the listed files lie that it lacks: those that several predictors of one body share.
+    pub body: Option<String>,
     /// Material of the training data.
     pub material: elements::Material,
     /// Mesh.

@@ -24,6 +24,6 @@ pub use manifest::{
 };
 pub use mesh::Mesh;
 pub(crate) use mesh::volume;
-pub use place::Place;
 pub(crate) use place::read_regular;
+pub use place::{Place, file_of};
 pub use tensors::TensorFile;

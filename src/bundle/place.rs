@@ -1,6 +1,7 @@
-//! Where a bundle's files lie: in a folder, or in memory, for hosts that have no files or keep theirs in archives.
+//! Where a bundle's files lie: in a folder, in part in that of its body beside it, or in memory, for hosts that have no files or keep theirs in
+//! archives.
 //!
-//! REQ-003: Only regular files in the bundle's own folder are read.
+//! REQ-003: Only regular files are read, in the bundle's own folder and in the one beside it that its manifest names as its body.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,18 +15,56 @@ use crate::memory;
 /// Where a bundle's files lie.
 #[derive(Debug)]
 pub enum Place {
-    /// A folder.
-    Folder(PathBuf),
+    /// A folder, and for what it lacks that of the body.
+    Folder {
+        /// The bundle's own.
+        own: PathBuf,
+        /// The body's, where the manifest names one.
+        body: Option<PathBuf>,
+    },
     /// Name and bytes. A file is read once, and leaves the list then.
     Memory(Mutex<BTreeMap<String, Vec<u8>>>),
 }
 
 impl Place {
+    /// A bundle's folder.
+    pub fn folder(own: &Path) -> Place {
+        Place::Folder {
+            own: own.to_owned(),
+            body: None,
+        }
+    }
+
+    /// Takes what the bundle's folder lacks from the folder `body` beside it. Files in memory are one list.
+    pub(super) fn take_body(&mut self, name: &str) {
+        if let Place::Folder { own, body } = self {
+            *body = Some(beside(own, name));
+        }
+    }
+
+    /// For messages about a file that lies in the body's folder: which that is.
+    pub(super) fn of_body(&self, name: &str) -> String {
+        match (self, self.path(name)) {
+            (Place::Folder { own, .. }, Some(path)) if path.parent() != Some(own) => {
+                format!("lies in the body's folder as {}; ", path.display())
+            }
+            _ => String::new(),
+        }
+    }
+
+    /// Where a file lies, if it lies in a folder.
+    pub(super) fn path(&self, name: &str) -> Option<PathBuf> {
+        match self {
+            Place::Folder { own, body } => Some(within(own, body.as_deref(), name)),
+            Place::Memory(_) => None,
+        }
+    }
+
     /// Bytes of a file.
     pub(super) fn length(&self, name: &str) -> Result<u64> {
         match self {
-            Place::Folder(folder) => {
-                let path = folder.join(name);
+            Place::Folder { own, body } => {
+                let path = within(own, body.as_deref(), name);
                 let found = fs::metadata(&path).map_err(|error| Error::io(&path, error))?;
                 match found.is_file() {
                     true => Ok(found.len()),
@@ -43,13 +82,36 @@ impl Place {
     /// A file.
     pub(super) fn read(&self, name: &str) -> Result<Vec<u8>> {
         match self {
-            Place::Folder(folder) => read_regular(&folder.join(name)),
+            Place::Folder { own, body } => read_regular(&within(own, body.as_deref(), name)),
             Place::Memory(files) => {
                 let mut files = files.lock().unwrap_or_else(PoisonError::into_inner);
                 files.remove(name).ok_or_else(|| not_given(name))
             }
         }
     }
+}
+
+/// The folder `name` beside `own`.
+fn beside(own: &Path, name: &str) -> PathBuf {
+    match own.file_name() {
+        Some(_) => own.with_file_name(name),
+        None => own.join("..").join(name),
+    }
+}
+
+/// A file of the bundle's own folder, and where that has nothing of this name, of the body's.
+fn within(own: &Path, body: Option<&Path>, name: &str) -> PathBuf {
+    let path = own.join(name);
+    match body {
+        Some(body) if fs::symlink_metadata(&path).is_err() => body.join(name),
+        _ => path,
+    }
+}
+
+/// Where the file `name` of a bundle lies whose manifest names `body`, a plain name, as its body.
+pub fn file_of(bundle: &Path, body: Option<&str>, name: &str) -> PathBuf {
+    let body = body.map(|body| beside(bundle, body));
+    within(bundle, body.as_deref(), name)
 }
 
 fn not_given(name: &str) -> Error {

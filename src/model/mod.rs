@@ -90,7 +90,7 @@ impl Model {
     /// [`crate::Error::Runtime`], [`crate::Error::Provider`].
     pub fn open(path: &Path, options: &ModelOptions) -> Result<Arc<Model>> {
         let _span = tracing::info_span!("open", path = %path.display()).entered();
-        Model::open_at(Place::Folder(path.to_owned()), options)
+        Model::open_at(Place::folder(path), options)
     }
 
     /// As [`Model::open`], of a bundle whose files are in memory, by name.

@@ -1,5 +1,6 @@
 //! Every damage of a bundle is an error that names file and field, never a crash.
 
+mod body;
 #[path = "../fixture/mod.rs"]
 mod fixture;
 mod manifest;

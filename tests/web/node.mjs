@@ -176,8 +176,16 @@ const tests = {
     assert.equal(asked[0], "http://host/some/bundle/bundle.json");
     assert.ok(asked.slice(1).every((url) => /\?sha256=[0-9a-f]{16}$/.test(url)), asked.join(" "));
     assert.equal(told.at(-1), 1);
+    // What its folder does not have lies in that of its body.
+    const fields = JSON.parse(new TextDecoder().decode(files["bundle.json"]));
+    delete fields.manifest_sha256; // a manifest without a digest is taken
+    files["bundle.json"] = new TextEncoder().encode(JSON.stringify({ ...fields, body: "organ" }));
+    const apart = async (url) => (/\/(net\/(?!mesh)|organ\/mesh)/.test(url.pathname) ? get(url) : new Response("", { status: 404, statusText: "Not Found" }));
+    asked.length = 0;
+    await upt.open("http://host/net", { fetch: apart });
+    assert.ok(asked.some((url) => url.startsWith("http://host/organ/mesh.safetensors?sha256=")), asked.join(" "));
     delete files["mesh.safetensors"];
-    await assert.rejects(upt.open("http://host/bundle/", { fetch: get }), refused("UPT_ERR_IO", /mesh\.safetensors.*404/));
+    await assert.rejects(upt.open("http://host/net/", { fetch: apart }), refused("UPT_ERR_IO", /organ\/mesh\.safetensors.*404/));
   },
 
   async a_step_has_the_pose_of_its_own_moment() {

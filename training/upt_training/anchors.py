@@ -17,7 +17,7 @@ from safetensors.numpy import save_file
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from upt_training.bundle_folder import MANIFEST, read_manifest, write_manifest
+from upt_training.bundle_folder import MANIFEST, file_of, read_manifest, write_manifest
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh, load_mesh
 
@@ -104,7 +104,7 @@ def add_to_bundle(bundle: Path, spacing_mm: float, per_node: int) -> Anchors:
         raise InputError(f"{bundle / MANIFEST}: anchors are for kind `upt` with base `prior`")
     if not spacing_mm > 0.0 or per_node < 4:
         raise InputError("anchors: --spacing must be positive and --neighbours at least 4")
-    anchors = make_anchors(load_mesh(bundle / manifest["mesh"]["file"]), spacing_mm, per_node)
+    anchors = make_anchors(load_mesh(file_of(bundle, manifest, manifest["mesh"]["file"])), spacing_mm, per_node)
     tensors = {"nodes": anchors.nodes, "neighbours": anchors.neighbours, "weights": anchors.weights}
     save_file(tensors, bundle / FILE, metadata={"spacing_mm": str(spacing_mm)})
     (bundle / FILE).chmod(0o644)

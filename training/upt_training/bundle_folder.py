@@ -43,11 +43,26 @@ def read_manifest(bundle: Path) -> dict:
     return json.loads(file.read_text(encoding="utf-8"))
 
 
+def file_of(bundle: Path, manifest: dict, name: str) -> Path:
+    """Where a file of a bundle lies: in its folder, else in that of its body beside it (the field `body`)."""
+    own, body = bundle / name, manifest.get("body")
+    return own if own.exists() or not body else bundle.absolute().with_name(body) / name
+
+
+def copy_whole(bundle: Path, manifest: dict, out: Path) -> None:
+    """Copy the files of a bundle, those of its body too, to the folder `out`; `manifest` shares nothing then."""
+    names = {path.name for path in bundle.iterdir()} | set(manifest["files"])
+    for name in sorted(names):
+        shutil.copyfile(file_of(bundle, manifest, name), out / name)
+    manifest.pop("body", None)
+
+
 def write_manifest(folder: Path, manifest: dict) -> None:
     """Write `bundle.json`: every other file's `{"bytes", "sha256"}` under `files`, what a reader must know under
-    `requires`, and the manifest's own digest."""
+    `requires`, and the manifest's own digest. Files of the body (`body`) stay listed."""
     files = sorted(path for path in folder.iterdir() if not path.name.startswith(MANIFEST))
-    manifest["files"] = {path.name: file_entry(path) for path in files}
+    shared = manifest.get("files", {}) if manifest.get("body") else {}
+    manifest["files"] = dict(sorted((shared | {path.name: file_entry(path) for path in files}).items()))
     _write(folder, manifest, indent=2)
 
 

@@ -13,6 +13,7 @@ from safetensors.numpy import load_file
 
 from upt_training.anchors import Anchors
 from upt_training.bundle import BundleSession
+from upt_training.bundle_folder import file_of
 from upt_training.config import FEATURE_WIDTH, GraphSettings
 from upt_training.errors import InputError
 from upt_training.graph import build_graph
@@ -42,13 +43,13 @@ class BundleRunner:
         if precision not in self.manifest["precisions"]:
             raise InputError(f"{path}: precision {precision!r} is not in this bundle; export with --{precision}")
         self.settings = self.manifest["upt"]
-        self.mesh = mesh or load_mesh(folder / "mesh.safetensors")
+        self.mesh = mesh or load_mesh(file_of(folder, self.manifest, "mesh.safetensors"))
         self.graph = build_graph(self.mesh, GraphSettings(**self.settings["graph"]))
         suffix = "" if precision == "f32" else f".{precision}"
         self.session = BundleSession(folder, self.mesh, self.graph, suffix)
         own_mesh = self.mesh.sha256 == self.manifest["mesh"]["mesh_sha256"]
         file = self.settings.get("anchors") if own_mesh else None
-        self.anchors = Anchors(**load_file(folder / file)) if file else None
+        self.anchors = Anchors(**load_file(file_of(folder, self.manifest, file))) if file else None
         self.prior, self.lender = None, None
         if "prior" in self.manifest:
             if prior is None and mesh is not None and mesh.sha256 != self.manifest["mesh"]["mesh_sha256"]:
@@ -57,9 +58,9 @@ class BundleRunner:
             if swings and prior is not None and vibration is None:
                 raise InputError(f"{path}: the bundle uses free vibration; pass --vibration with the tables of {prior}")
             table = PriorTable(
-                prior or folder / self.manifest["prior"]["file"],
+                prior or file_of(folder, self.manifest, self.manifest["prior"]["file"]),
                 self.mesh.node_count,
-                (vibration or folder / swings) if swings else None,
+                (vibration or file_of(folder, self.manifest, swings)) if swings else None,
                 self.manifest["material"]["damping_per_s"],
                 self.manifest["dt_s"],
             )

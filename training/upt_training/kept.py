@@ -8,7 +8,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from upt_training.bundle_folder import MANIFEST, read_manifest, write_manifest
+from upt_training.bundle_folder import MANIFEST, file_of, read_manifest, write_manifest
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh
 
@@ -29,12 +29,12 @@ def keep_parts(kept: Path, out: Path, mesh: Mesh) -> None:
     files = {before["mesh"]["file"], *before.get("prior", {}).values()}
     if "corrections" in before:
         manifest["corrections"] = before["corrections"]
-        files.add(before["corrections"]["file"])
+        files |= {name for key, name in before["corrections"].items() if key in ("file", "whole")}
     if "anchors" in before["upt"]:
         manifest["upt"]["anchors"] = before["upt"]["anchors"]
         files.add(before["upt"]["anchors"])
     if "tools" in before["envelope"]:
         manifest["envelope"]["tools"] = before["envelope"]["tools"]
     for name in files:
-        shutil.copyfile(kept / name, out / name)
+        shutil.copyfile(file_of(kept, before, name), out / name)
     write_manifest(out, manifest)

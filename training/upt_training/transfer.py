@@ -45,6 +45,7 @@ def transfer(
     manifest["errors"] = {}
     manifest.pop("rest_displacement_mm", None)
     manifest["upt"].pop("anchors", None)
+    manifest.pop("body", None)
     with new_bundle(out) as folder:
         for file in [*bundle.glob("*.onnx"), bundle / manifest["upt"]["weights"]]:
             shutil.copyfile(file, folder / file.name)

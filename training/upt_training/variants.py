@@ -6,10 +6,9 @@
 from __future__ import annotations
 
 import argparse
-import shutil
 from pathlib import Path
 
-from upt_training.bundle_folder import MANIFEST, read_manifest, write_manifest
+from upt_training.bundle_folder import MANIFEST, copy_whole, read_manifest, write_manifest
 from upt_training.errors import InputError
 from upt_training.precision import write_variant
 
@@ -32,7 +31,8 @@ def make_variants(bundle: Path, out: Path, precisions: list[str]) -> None:
         raise InputError(
             f"{bundle / MANIFEST}: kind `{manifest['kind']}` has no graphs worth narrowing; give a `upt` one"
         )
-    shutil.copytree(bundle, out)
+    out.mkdir(parents=True)
+    copy_whole(bundle, manifest, out)
     for precision in precisions:
         write_variant(out, precision)
     manifest["precisions"] = sorted({"f32", *manifest["precisions"], *precisions})

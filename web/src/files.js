@@ -15,24 +15,32 @@ export async function files(source, { fetch: get = (url) => fetch(url), progress
 
 // The manifest, then all that it lists, at once. A file's address carries its hash, so that a cache keeps it for good.
 async function fetched(folder, get, progress) {
-  const read = async (url) => {
+  // What the folder does not have may lie in that of the body, beside it.
+  const read = async (url, other) => {
     const response = await get(url);
+    if (!response.ok && other) return read(other);
     if (!response.ok) throw new UptError("UPT_ERR_IO", `${url}: ${response.status} ${response.statusText}`);
     return new Uint8Array(await response.arrayBuffer());
   };
   const manifest = await read(new URL(MANIFEST, folder));
   let listed = {};
+  let body;
   try {
-    listed = JSON.parse(new TextDecoder().decode(manifest)).files ?? {};
+    const fields = JSON.parse(new TextDecoder().decode(manifest));
+    listed = fields.files ?? {};
+    if (/^[\w-][\w.-]*$/.test(fields.body)) body = new URL(`../${fields.body}/`, folder);
   } catch {
     // The library says what is wrong with it.
   }
   const total = Object.values(listed).reduce((sum, { bytes }) => sum + bytes, 0);
   let done = 0;
   const read_listed = async ([name, { bytes, sha256 }]) => {
-    const url = new URL(name, folder);
-    url.search = `sha256=${String(sha256).slice(0, 16)}`;
-    const file = await read(url);
+    const [own, other] = [folder, body].map((place) => {
+      const url = place && new URL(name, place);
+      if (url) url.search = `sha256=${String(sha256).slice(0, 16)}`;
+      return url;
+    });
+    const file = await read(own, other);
     done += bytes;
     progress?.(done, total);
     return [name, file];

@@ -89,6 +89,7 @@ def bundle(folder: Path) -> dict:
     return {
         "name": manifest["name"],
         "folder": folder.relative_to(ROOT).as_posix(),
+        "body": manifest.get("body"),
         "sha256": {file.name: digest(file) for file in sorted(folder.iterdir()) if file.is_file()},
         "material": manifest["material"],
         "boundary": manifest["boundary"],

@@ -220,8 +220,9 @@ fn unity(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
         }
     }
     // Unity leaves folders whose names end in ~ alone, so these need no .meta files.
-    let bundle = workspace.path("onnx/brain-reduced");
-    copy(&bundle, &root.join("Bundles~/brain-reduced"))?;
+    for (name, place) in Workspace::bundle_files(&workspace.path("onnx/brain-reduced"))? {
+        copy(&place, &root.join("Bundles~/brain-reduced").join(name))?;
+    }
     let notice = root.join("Documentation~/third-party-crates.txt");
     script(workspace, LICENCES, &notice)?;
     let file = out.join(format!("org.libupt.soft-tissue-{VERSION}.tgz"));

@@ -158,11 +158,8 @@ fn make_bundles(workspace: &Workspace) -> Result<()> {
 /// A bundle's files, compressed, without its certificate.
 fn write_bundle(from: &Path, to: &Path) -> Result<()> {
     std::fs::create_dir_all(to)?;
-    let text = std::fs::read(from.join("bundle.json"))?;
-    let manifest: Value = serde_json::from_slice(&text)?;
-    let files = manifest["files"].as_object().context("files")?;
-    for name in files.keys().map(String::as_str).chain(["bundle.json"]) {
-        compress(&from.join(name), &to.join(name))?;
+    for (name, place) in Workspace::bundle_files(from)? {
+        compress(&place, &to.join(name))?;
     }
     Ok(())
 }

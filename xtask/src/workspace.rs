@@ -41,6 +41,26 @@ impl Workspace {
         Ok(found)
     }
 
+    /// The files of a bundle as one folder of its own: name and place, those of its body too.
+    pub fn bundle_files(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
+        let path = folder.join("bundle.json");
+        let bytes =
+            std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let manifest: serde_json::Value = serde_json::from_slice(&bytes)?;
+        let listed = manifest["files"].as_object().context("files")?.keys();
+        let body = manifest["body"].as_str();
+        let place = |name: &String| {
+            let own = folder.join(name);
+            match body.filter(|_| !own.exists()) {
+                Some(body) => folder.with_file_name(body).join(name),
+                None => own,
+            }
+        };
+        let mut files: Vec<_> = listed.map(|name| (name.clone(), place(name))).collect();
+        files.push(("bundle.json".to_owned(), path));
+        Ok(files)
+    }
+
     /// A program of the virtual environment.
     pub fn venv_program(&self, name: &str) -> PathBuf {
         program_in(&self.path("target/venv"), name)

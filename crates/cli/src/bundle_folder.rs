@@ -72,7 +72,11 @@ impl BundleFolder {
             mesh_sha256: text(&fields["mesh"]["mesh_sha256"], "mesh.mesh_sha256")?,
             material: serde_json::from_value(fields["material"].clone())
                 .with_context(|| format!("{}: field `material`", file.display()))?,
-            mesh_file: path.join(text(&fields["mesh"]["file"], "mesh.file")?),
+            mesh_file: upt::bundle::file_of(
+                path,
+                fields["body"].as_str(),
+                &text(&fields["mesh"]["file"], "mesh.file")?,
+            ),
             sha256: format!("{:x}", sha2::Sha256::digest(&bytes)),
         })
     }

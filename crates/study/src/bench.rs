@@ -113,7 +113,8 @@ impl Bench {
         )?;
         let text = std::fs::read_to_string(path.join("bundle.json"))?;
         let manifest: serde_json::Value = serde_json::from_str(&text)?;
-        let mesh = Mesh::read(&path.join("mesh.safetensors"))?;
+        let body = manifest["body"].as_str();
+        let mesh = Mesh::read(&upt::bundle::file_of(path, body, "mesh.safetensors"))?;
         let boundary = match manifest["boundary"].as_str() {
             Some("supported") => Boundary::Supported,
             _ => Boundary::Fixed,

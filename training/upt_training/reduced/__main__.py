@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from upt_training.bundle_folder import file_of, read_manifest
 from upt_training.errors import InputError
 from upt_training.loads import WITHHELD
 from upt_training.mesh_file import load_mesh
@@ -144,7 +145,8 @@ def run_prior(args: argparse.Namespace) -> None:
 
 
 def run_evaluate(args: argparse.Namespace) -> None:
-    mesh = load_mesh(args.bundle / "mesh.safetensors")
+    manifest = read_manifest(args.bundle)
+    mesh = load_mesh(file_of(args.bundle, manifest, "mesh.safetensors"))
     cases = [case for folder in args.data for case in open_dataset(folder, mesh.sha256)]
     if not args.all:
         cases = [case for case in cases if case.split == "test" or case.scheme == WITHHELD]
@@ -154,7 +156,6 @@ def run_evaluate(args: argparse.Namespace) -> None:
     if args.json:
         args.json.write_text(json.dumps(result, indent=2))
     if args.into:
-        manifest = json.loads((args.bundle / "bundle.json").read_text())
         insert_table(args.into, args.label or manifest["name"], table(result))
     print(table(result))
 
@@ -219,7 +220,8 @@ def run_domain(args: argparse.Namespace) -> None:
 
 
 def run_response_error(args: argparse.Namespace) -> None:
-    mesh, columns = load_mesh(args.bundle / "mesh.safetensors"), load_columns(args.columns)
+    mesh = load_mesh(file_of(args.bundle, read_manifest(args.bundle), "mesh.safetensors"))
+    columns = load_columns(args.columns)
     check_columns(mesh, columns)
     print(json.dumps(response_error(args.bundle, columns, mesh, sites=args.sites)))
 

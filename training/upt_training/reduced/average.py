@@ -6,13 +6,12 @@ tables (`build --keep`). The bound of the runtime is the widest of theirs, the e
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import onnx
 from onnx import compose, helper
 
-from upt_training.bundle_folder import MANIFEST, new_bundle, read_manifest, write_manifest
+from upt_training.bundle_folder import MANIFEST, copy_whole, new_bundle, read_manifest, write_manifest
 from upt_training.errors import InputError
 
 
@@ -62,8 +61,7 @@ def average(bundles: list[Path], out: Path) -> dict:
     manifest["provenance"] = {"mean_of": [other["provenance"] for other in manifests]}
     manifest["errors"] = {}
     with new_bundle(out) as folder:
-        for file in bundles[0].iterdir():
-            shutil.copyfile(file, folder / file.name)
+        copy_whole(bundles[0], manifest, folder)
         onnx.save(mean_graph([bundle / "latent.onnx" for bundle in bundles]), str(folder / "latent.onnx"))
         write_manifest(folder, manifest)
     return manifest

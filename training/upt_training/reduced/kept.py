@@ -5,13 +5,12 @@ The tables of a fine mesh are the largest part of a bundle, and its corrections 
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
 import onnx
 
-from upt_training.bundle_folder import new_bundle, read_manifest, write_manifest
+from upt_training.bundle_folder import copy_whole, file_of, new_bundle, read_manifest, write_manifest
 from upt_training.errors import InputError
 from upt_training.mesh_file import Mesh
 from upt_training.reduced.columns import Columns
@@ -36,7 +35,7 @@ def kept_tables(bundle: Path, mesh: Mesh, columns: Columns) -> tuple[Modes, Prio
         raise InputError(f"{bundle}/bundle.json: mesh_sha256 differs from --mesh; pass the mesh of this bundle")
     if manifest["boundary"] != columns.metadata["boundary"]:
         raise InputError(f"{bundle}/bundle.json: boundary is {manifest['boundary']!r}, --columns has another")
-    prior = load_prior(bundle / manifest["prior"]["file"])
+    prior = load_prior(file_of(bundle, manifest, manifest["prior"]["file"]))
     residual = prior.field(prior.residual).reshape(len(prior.residual), -1)
     response = response_modes(columns, prior.force_to_z)
     unknown = np.zeros(0, np.float32)
@@ -66,8 +65,7 @@ def write_retrained(
     manifest = read_manifest(kept)
     envelope = about.envelope | {name: v for name, v in manifest["envelope"].items() if name == "tools"}
     with new_bundle(out) as folder:
-        for file in kept.iterdir():
-            shutil.copyfile(file, folder / file.name)
+        copy_whole(kept, manifest, folder)
         onnx.save(latent_graph(model.eval()), str(folder / "latent.onnx"))
         manifest |= {
             "name": about.name,

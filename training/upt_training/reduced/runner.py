@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 
+from upt_training.bundle_folder import file_of
 from upt_training.errors import InputError
 from upt_training.lend import Lender
 from upt_training.mesh_file import load_mesh
@@ -22,8 +23,8 @@ class ReducedRunner:
         self.manifest = json.loads((folder / "bundle.json").read_text())
         if self.manifest["kind"] != "reduced":
             raise InputError(f"{folder}/bundle.json: kind is {self.manifest['kind']!r}, expected 'reduced'")
-        self.prior = load_prior(folder / self.manifest["prior"]["file"])
-        mesh = load_mesh(folder / self.manifest["mesh"]["file"])
+        self.prior = load_prior(file_of(folder, self.manifest, self.manifest["prior"]["file"]))
+        mesh = load_mesh(file_of(folder, self.manifest, self.manifest["mesh"]["file"]))
         self.lender = Lender(mesh, self.prior.contact_nodes, self.manifest["boundary"])
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = 1

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use tissue::mesh::{Boundary, Mesh};
 use tissue::programmes::ToolProgramme;
+use upt::bundle::file_of;
 use upt::{Model, ModelOptions};
 
 use super::case::{self, Body};
@@ -72,7 +73,9 @@ impl Bundle {
                 folder.display()
             );
         }
-        let mesh = Mesh::read(&folder.join(&model.manifest.mesh.file))?;
+        let stated = &model.manifest;
+        let mesh = file_of(folder, stated.body.as_deref(), &stated.mesh.file);
+        let mesh = Mesh::read(&mesh)?;
         let boundary = match model.manifest.boundary {
             upt::bundle::Boundary::Fixed => Boundary::Fixed,
             upt::bundle::Boundary::Supported => Boundary::Supported,

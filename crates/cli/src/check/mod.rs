@@ -29,6 +29,7 @@ use tissue::programmes::ToolProgramme;
 use tissue::schemes::{FRAMES, Scheme};
 use upt::Corrections;
 
+use crate::bundle_folder::BundleFolder;
 use crate::parallel::{in_parallel, workers};
 use crate::tool_scale::{self, Chosen};
 use crate::{loads, progress};
@@ -142,7 +143,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         println!("{}", found.text());
     }
     if options.write {
-        let mesh = Mesh::read(&options.bundle.join("mesh.safetensors"))?;
+        let mesh = Mesh::read(&BundleFolder::read(&options.bundle)?.mesh_file)?;
         found.write(&options.bundle, &mesh, &[])?;
     }
     let stated = before.and_then(|text| text["contact"]["mse_mm2"].as_f64());

@@ -15,7 +15,7 @@ pub fn add(bundle: &Path, file: &str, entry: &Value) -> Result<()> {
     })
 }
 
-/// Takes a file off the list, and away.
+/// Takes a file off the list, and away from the bundle's folder.
 pub fn forget(bundle: &Path, file: &str) -> Result<()> {
     let mut manifest = Manifest::read(bundle)?;
     let mut files: IndexMap<String, Value> = manifest.get("files")?.unwrap_or_default();
@@ -24,7 +24,11 @@ pub fn forget(bundle: &Path, file: &str) -> Result<()> {
     }
     manifest.set("files", &json!(files), "")?;
     manifest.write()?;
-    Ok(std::fs::remove_file(bundle.join(file))?)
+    // Where other bundles share it, it lies in the body's folder, and stays.
+    match std::fs::remove_file(bundle.join(file)) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
+        _ => Ok(()),
+    }
 }
 
 /// Lists `file`, changes the manifest, sets the requirement, and seals it.

@@ -9,7 +9,7 @@ use tissue::linear::{
     ColumnsFile, Factor, Lame, NaturalModes, Stiffness, compliance_columns, natural_modes,
 };
 use tissue::mesh::{Boundary, Mesh};
-use upt::bundle::BundleFiles;
+use upt::bundle::{BundleFiles, file_of};
 use upt::prior::{CoarseSpace, PriorTable};
 
 use super::pushes::Pushes;
@@ -68,7 +68,7 @@ impl Workbench {
             upt::bundle::Boundary::Fixed => Boundary::Fixed,
             upt::bundle::Boundary::Supported => Boundary::Supported,
         };
-        let mesh = Mesh::read(&bundle.join(&stated.mesh.file))?;
+        let mesh = Mesh::read(&file_of(bundle, stated.body.as_deref(), &stated.mesh.file))?;
         let held = mesh.held_nodes(boundary);
         let material = stated.material;
         let lame = Lame::from_young(material.young_pa, material.poisson)?;
