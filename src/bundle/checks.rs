@@ -106,6 +106,14 @@ impl Manifest {
         }
         if let Some(prior) = &self.prior {
             self.listed(&prior.file, "prior.file")?;
+            if let Some(residual) = &prior.residual {
+                self.listed(residual, "prior.residual")?;
+                check(
+                    self.reduced.is_some(),
+                    "prior.residual",
+                    "needs a learned map (field `reduced`)",
+                )?;
+            }
             if let Some(vibration) = &prior.vibration {
                 self.listed(vibration, "prior.vibration")?;
                 let swings = match self.kind {

@@ -85,7 +85,7 @@ const KEYS: &[(&str, &[&str])] = &[
             "max_tools",
         ],
     ),
-    ("prior", &["file", "release", "vibration"]),
+    ("prior", &["file", "release", "residual", "vibration"]),
     (
         "corrections",
         &[

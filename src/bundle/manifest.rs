@@ -84,6 +84,8 @@ pub struct ToolEnvelope {
 pub struct PriorEntry {
     /// File of the bundle.
     pub file: String,
+    /// File with the residual modes, where the response's file has none because other predictors share it.
+    pub residual: Option<String>,
     /// File with the free vibration that follows a release; not together with a learned map of kind `reduced`.
     pub vibration: Option<String>,
     /// File with the learned map of a release, in addition to the free vibration of kind `reduced`.

@@ -23,7 +23,7 @@ pub struct Release {
 impl Release {
     /// Reads and checks the file for fields of `width` block coordinates, `Q`.
     pub fn parse(file: &TensorFile, width: usize) -> Result<Release> {
-        let modes = file.f32("modes", &[None, Some(width)])?;
+        let modes = file.float("modes", &[None, Some(width)])?;
         let count = modes.len() / width.max(1);
         if count == 0 || count > LIMIT {
             return Err(file.bad("modes", format!("must hold 1 to {LIMIT} modes")));

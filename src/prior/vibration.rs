@@ -57,10 +57,10 @@ impl FreeVibration {
             return Err(file.bad("frequency", format!("element {at} is not positive")));
         }
         Ok(FreeVibration {
-            force_to_mode: file.f32("force_to_mode", &[Some(dofs), Some(count)])?,
-            modes: file.f32("modes", &[Some(count), Some(width)])?,
+            force_to_mode: file.float("force_to_mode", &[Some(dofs), Some(count)])?,
+            modes: file.float("modes", &[Some(count), Some(width)])?,
             projection: if projected {
-                file.f32("projection", &[Some(count), Some(width)])?
+                file.float("projection", &[Some(count), Some(width)])?
             } else {
                 Vec::new()
             },

@@ -4,6 +4,7 @@ mod body;
 #[path = "../fixture/mod.rs"]
 mod fixture;
 mod manifest;
+mod ragged;
 
 use std::collections::BTreeMap;
 use std::io::{Seek, SeekFrom, Write};

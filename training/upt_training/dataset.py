@@ -21,6 +21,7 @@ DTYPES = {
     "F16": np.dtype("<f2"),
     "I32": np.dtype("<i4"),
     "F64": np.dtype("<f8"),
+    "U8": np.dtype("u1"),
 }
 
 

@@ -15,6 +15,7 @@ from scipy.linalg import cho_factor, cho_solve
 from upt_training.dataset import map_safetensors
 from upt_training.errors import InputError
 from upt_training.reduced.near import whole_compliance
+from upt_training.reduced.ragged import whole_response
 
 DENSE_LIMIT = 1 << 30  # bytes of a dense table made by `restrict`
 
@@ -47,7 +48,7 @@ class PriorTable:
         self.row = np.full(node_count, -1)
         self.row[tensors["contact_nodes"]] = np.arange(len(tensors["contact_nodes"]))
         self.compliance = whole_compliance(tensors, path).astype(np.float64)
-        self.response_q = np.asarray(tensors["response"], np.float32)
+        self.response_q = np.asarray(whole_response(tensors), np.float32)
         self.blocks = []
         basis, at = np.asarray(tensors["basis"], np.float32), 0
         offsets, ranks, nodes = (

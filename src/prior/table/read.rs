@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use half::f16;
+use safetensors::tensor::Dtype;
+
 use super::{NO_COLUMN, PriorTable};
 use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, PriorEntry, TensorFile};
 use crate::error::Result;
@@ -19,7 +22,11 @@ impl PriorTable {
     /// Reads and checks the tables that the manifest's entry names.
     pub fn open(files: &BundleFiles, entry: &PriorEntry, mesh: &Mesh) -> Result<PriorTable> {
         let manifest = &files.manifest;
-        let mut table = PriorTable::parse(&files.tensors(&entry.file)?, manifest, mesh)?;
+        let tables = files.tensors(&entry.file)?;
+        let learned = (entry.residual.as_ref()).map(|name| files.tensors(name));
+        let learned = learned.transpose()?;
+        let learned = learned.as_ref().unwrap_or(&tables);
+        let mut table = PriorTable::parse(&tables, learned, manifest, mesh)?;
         if let Some(name) = &entry.vibration {
             let mut vibration = FreeVibration::parse(
                 &files.tensors(name)?,
@@ -40,7 +47,13 @@ impl PriorTable {
     }
 
     /// Reads the tables and checks every length, index and order once, here: kernels and solves rely on them without looking.
-    fn parse(file: &TensorFile, manifest: &Manifest, mesh: &Mesh) -> Result<PriorTable> {
+    /// The residual modes and what belongs to them are in `learned`, which may be the same file.
+    fn parse(
+        file: &TensorFile,
+        learned: &TensorFile,
+        manifest: &Manifest,
+        mesh: &Mesh,
+    ) -> Result<PriorTable> {
         let count = mesh.node_count();
         let contact_nodes = file.ascending("contact_nodes", count)?;
         if contact_nodes.is_empty() {
@@ -93,7 +106,7 @@ impl PriorTable {
         })?;
         let optional = |name: &str, shape: [usize; 2]| {
             if shape[1] > 0 {
-                file.float(name, &[Some(shape[0]), Some(shape[1])])
+                learned.float(name, &[Some(shape[0]), Some(shape[1])])
             } else {
                 Ok(Vec::new())
             }
@@ -106,6 +119,10 @@ impl PriorTable {
         for &node in &mesh.domain_nodes {
             in_domain[node as usize] = true;
         }
+        let response = match file.has(RANKS) {
+            true => ragged(file, contact_nodes.len(), &rank_offsets)?,
+            false => Numbers::read(file, "response", &[Some(dofs), Some(width)])?,
+        };
         let narrow = |values: Vec<usize>| {
             let narrow = values.iter().map(|&value| value as u32);
             memory::collected(values.len(), narrow, WHAT)
@@ -121,9 +138,9 @@ impl PriorTable {
             rank_offsets: narrow(rank_offsets)?,
             copies: None,
             basis: Arc::new(Numbers::read(file, "basis", &[Some(size)])?),
-            response: Arc::new(Numbers::read(file, "response", &[Some(dofs), Some(width)])?),
+            response: Arc::new(response),
             residual: if modes > 0 {
-                file.float("residual", &[Some(modes), Some(width)])?
+                learned.float("residual", &[Some(modes), Some(width)])?
             } else {
                 Vec::new()
             },
@@ -133,6 +150,51 @@ impl PriorTable {
             vibration: None,
         })
     }
+}
+
+/// How many coordinates of each block a contact node's rows hold, in eights.
+const RANKS: &str = "response_ranks";
+
+/// What a file leaves out is memory all the same: a small file asks for no more than so many times its size.
+const MOST_ZEROS: usize = 64;
+
+/// A response that holds of each block the leading coordinates alone, `[3D,Q]`: what a contact node does not reach is zero.
+fn ragged(file: &TensorFile, columns: usize, rank_offsets: &[usize]) -> Result<Numbers> {
+    let blocks = rank_offsets.len() - 1;
+    let width = rank_offsets[blocks];
+    let kept = file.raw(RANKS, Dtype::U8, &[Some(columns), Some(blocks)])?;
+    let mut count = 0;
+    for (at, &eights) in kept.iter().enumerate() {
+        let block = at % blocks;
+        if 8 * usize::from(eights) > rank_offsets[block + 1] - rank_offsets[block] {
+            let (node, rank) = (at / blocks, rank_offsets[block + 1] - rank_offsets[block]);
+            let problem = format!(
+                "element [{node}, {block}] is {eights} times 8, more than the rank {rank} of its block"
+            );
+            return Err(file.bad(RANKS, problem));
+        }
+        count += 24 * usize::from(eights);
+    }
+    let stored = file.f16("response", &[Some(count)])?;
+    let size = (3 * columns).checked_mul(width);
+    let most = MOST_ZEROS * (kept.len() + count);
+    let Some(size) = size.filter(|size| *size <= most) else {
+        return Err(file.bad(
+            RANKS,
+            format!("leave less than one in {MOST_ZEROS} of the response"),
+        ));
+    };
+    let mut whole = memory::filled(size, f16::ZERO, WHAT)?;
+    let mut from = stored.as_slice();
+    for (row, to) in whole.chunks_exact_mut(width.max(1)).enumerate() {
+        let kept = &kept[row / 3 * blocks..][..blocks];
+        for (&eights, &start) in kept.iter().zip(rank_offsets) {
+            let (own, rest) = from.split_at(8 * usize::from(eights));
+            to[start..start + own.len()].copy_from_slice(own);
+            from = rest;
+        }
+    }
+    Numbers::of_f16(whole)
 }
 
 /// By node: where its three rows in the basis start, where the coordinates of its block start, and how many.

@@ -22,6 +22,7 @@ from upt_training.reduced.domain import beside_domain, patches_of_domain, worst_
 from upt_training.reduced.evaluate import evaluate, insert_table, table
 from upt_training.reduced.export import near_of
 from upt_training.reduced.make_prior import check_columns, make_prior, prior_error
+from upt_training.reduced.narrow import narrow_command
 from upt_training.reduced.prior import load_prior, save_prior
 from upt_training.reduced.response_error import response_error
 from upt_training.reduced.sweep import sweep
@@ -115,6 +116,15 @@ def arguments() -> argparse.ArgumentParser:
     mean = commands.add_parser("average", help="the mean of trainings of one bundle (`build --keep`) as a bundle")
     mean.add_argument("bundles", type=Path, nargs="+", help="bundle folders; the first gives everything but the mean")
     mean.add_argument("--out", type=Path, required=True, help="bundle folder")
+
+    small = commands.add_parser("narrow", help="smaller tables for finished bundles of one body, which share them")
+    small.add_argument("bundles", type=Path, nargs="+", help="bundle folders; the first is the body of the others")
+    small.add_argument("--out", type=Path, required=True, help="folder for the new ones")
+    small.add_argument("--tolerance-mm", type=float, default=6e-3, help="what a block's basis may leave out, RMS")
+    small.add_argument("--mode-mm", type=float, default=1.0, help="how much of a mode counts beside pushes of 10 mm")
+    small.add_argument("--near-mm", type=float, default=20.0, help="pairs of contact nodes with exact compliance")
+    small.add_argument("--drop", type=float, default=1e-3, help="of a block's response to 1 mN, what is left out, mm")
+    small.add_argument("--one-space", action="store_true", help="corrections and whole modes of the first for all")
 
     domain = commands.add_parser("domain", help="a copy of a mesh with another domain; its hash stays")
     domain.add_argument("--mesh", type=Path, required=True)
@@ -227,6 +237,7 @@ def run_response_error(args: argparse.Namespace) -> None:
 
 
 COMMANDS = {
+    "narrow": narrow_command,
     "prior": run_prior,
     "build": run_build,
     "modes": run_build,

@@ -13,7 +13,7 @@ import numpy as np
 
 from upt_training.errors import InputError
 
-_DTYPES = {"F32": np.float32, "F16": np.float16, "I32": np.int32}
+_DTYPES = {"F32": np.float32, "F16": np.float16, "I32": np.int32, "U8": np.uint8}
 
 
 @dataclass

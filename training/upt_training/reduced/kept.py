@@ -35,7 +35,9 @@ def kept_tables(bundle: Path, mesh: Mesh, columns: Columns) -> tuple[Modes, Prio
         raise InputError(f"{bundle}/bundle.json: mesh_sha256 differs from --mesh; pass the mesh of this bundle")
     if manifest["boundary"] != columns.metadata["boundary"]:
         raise InputError(f"{bundle}/bundle.json: boundary is {manifest['boundary']!r}, --columns has another")
-    prior = load_prior(file_of(bundle, manifest, manifest["prior"]["file"]))
+    entry = manifest["prior"]
+    learned = entry.get("residual") and file_of(bundle, manifest, entry["residual"])
+    prior = load_prior(file_of(bundle, manifest, entry["file"]), learned)
     residual = prior.field(prior.residual).reshape(len(prior.residual), -1)
     response = response_modes(columns, prior.force_to_z)
     unknown = np.zeros(0, np.float32)

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from upt_training.errors import InputError
+from upt_training.reduced.ragged import whole_response
 
 
 def near_tensors(compliance: np.ndarray, points: np.ndarray, near_mm: float) -> dict[str, np.ndarray]:
@@ -40,6 +41,7 @@ def whole_compliance(tensors: dict[str, np.ndarray], path: object) -> np.ndarray
     row[nodes] = np.arange(count)
     offsets, ranks = np.array(tensors["block_offsets"]), np.array(tensors["rank_offsets"])
     out = np.zeros((count, 3, 3 * count), np.float32)
+    whole = whole_response(tensors)
     at = 0
     for block in range(len(offsets) - 1):
         members, rank = block_nodes[offsets[block] : offsets[block + 1]], ranks[block + 1] - ranks[block]
@@ -47,7 +49,7 @@ def whole_compliance(tensors: dict[str, np.ndarray], path: object) -> np.ndarray
         touched = row[members] >= 0
         if touched.any():
             basis = np.asarray(tensors["basis"][at : at + size], np.float32).reshape(len(members), 3, rank)
-            response = np.asarray(tensors["response"][:, ranks[block] : ranks[block + 1]], np.float32)
+            response = np.asarray(whole[:, ranks[block] : ranks[block + 1]], np.float32)
             rows = basis[touched].reshape(-1, rank) @ response.T
             out[row[members[touched]]] = rows.reshape(-1, 3, 3 * count)
         at += size

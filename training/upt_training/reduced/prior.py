@@ -16,6 +16,7 @@ from upt_training.errors import InputError
 from upt_training.reduced.block_basis import BlockBasis
 from upt_training.reduced.columns import contact_forces, map_tensors, rows_of
 from upt_training.reduced.near import whole_compliance
+from upt_training.reduced.ragged import whole_response
 
 
 @dataclass
@@ -102,9 +103,12 @@ def trajectory_forces(
     return out.reshape(frames, -1)
 
 
-def load_prior(path: Path | str) -> Prior:
-    """Read a prior file into memory; raises `InputError` naming the missing tensor."""
+def load_prior(path: Path | str, residual: Path | str | None = None) -> Prior:
+    """Read a prior file into memory, its residual modes from a file of their own where a bundle has one.
+
+    Raises `InputError` naming the missing tensor."""
     tensors, metadata = map_tensors(path)
+    learned = map_tensors(residual)[0] if residual else tensors
     names = ("contact_nodes", "block_nodes", "block_offsets", "rank_offsets", "basis", "response")
     for name in names:
         if name not in tensors:
@@ -118,16 +122,16 @@ def load_prior(path: Path | str) -> Prior:
         bases.append(flat[at : at + rows * rank].reshape(rows, rank).astype(np.float32))
         at += rows * rank
     basis = BlockBasis(np.array(tensors["block_nodes"]), block_offsets, bases)
-    response = np.array(tensors["response"])
+    response = np.array(whole_response(tensors))
     empty = np.zeros((len(response), 0), np.float32)
     return Prior(
         np.array(tensors["contact_nodes"]),
         whole_compliance(tensors, path),
         basis,
         response,
-        np.array(tensors.get("residual", np.zeros((0, response.shape[1]), np.float32))),
-        np.array(tensors.get("force_to_z", empty)),
-        np.array(tensors.get("force_to_p", empty)),
+        np.array(learned.get("residual", np.zeros((0, response.shape[1]), np.float32))),
+        np.array(learned.get("force_to_z", empty)),
+        np.array(learned.get("force_to_p", empty)),
         metadata,
     )
 

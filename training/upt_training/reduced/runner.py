@@ -23,7 +23,9 @@ class ReducedRunner:
         self.manifest = json.loads((folder / "bundle.json").read_text())
         if self.manifest["kind"] != "reduced":
             raise InputError(f"{folder}/bundle.json: kind is {self.manifest['kind']!r}, expected 'reduced'")
-        self.prior = load_prior(file_of(folder, self.manifest, self.manifest["prior"]["file"]))
+        entry = self.manifest["prior"]
+        learned = entry.get("residual") and file_of(folder, self.manifest, entry["residual"])
+        self.prior = load_prior(file_of(folder, self.manifest, entry["file"]), learned)
         mesh = load_mesh(file_of(folder, self.manifest, self.manifest["mesh"]["file"]))
         self.lender = Lender(mesh, self.prior.contact_nodes, self.manifest["boundary"])
         options = onnxruntime.SessionOptions()
