@@ -31,7 +31,7 @@ def library() -> Path:
         raise SystemExit(f"{ROOT} is not the libupt repository: install from a clone, or from a wheel")
     if not shutil.which("cargo"):
         raise SystemExit("cargo is missing: libupt is built by Rust 1.92 or later (https://rustup.rs)")
-    subprocess.run(["cargo", "build", "--release", "--package", "upt"], cwd=ROOT, check=True)
+    subprocess.run(["cargo", "build", "--release", "--package", "libupt"], cwd=ROOT, check=True)
     target = Path(os.environ.get("CARGO_TARGET_DIR", "target"))
     name = {"win32": "upt.dll", "darwin": "libupt.dylib"}.get(sys.platform, "libupt.so")
     return (ROOT / target / "release" / name).resolve()

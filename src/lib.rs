@@ -11,8 +11,8 @@
 //! use upt::{Contact, IndexSet, Model, ModelOptions, Scene, SceneOptions, Shape, Tool};
 //!
 //! # fn main() -> upt::Result<()> {
-//! // A bundle's folder; this one has no network, so that it needs no ONNX Runtime.
-//! let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
+//! // A bundle's folder, here the block that lies in this package. It has no network, so it needs no ONNX Runtime.
+//! let model = Model::open(Path::new("examples/block"), &ModelOptions::default())?;
 //! let scene = Scene::new(model.clone(), &SceneOptions::default())?;
 //! let mut u = vec![0.0; 3 * scene.node_count()]; // [K,3], mm
 //!

@@ -15,13 +15,13 @@ build="$(cd "$build" && pwd)"
 prefix="$build/prefix"
 
 if [ ! -e "$libraries/libupt.so" ]; then
-  echo "no libupt.so in $libraries; run: cargo build --release -p upt"
+  echo "no libupt.so in $libraries; run: cargo build --release -p libupt"
   echo "0 passed, 1 failed, 0 skipped"
   exit 1
 fi
 
 # A library that can be made to panic and has no instruments, in a folder of its own so that it is never packaged.
-cargo build --release --quiet --manifest-path "$root/Cargo.toml" -p upt --no-default-features --features fault,learned \
+cargo build --release --quiet --manifest-path "$root/Cargo.toml" -p libupt --no-default-features --features fault,learned \
   --target-dir "$build/fault"
 ln -sf libupt.so "$build/fault/release/libupt.so.0"
 

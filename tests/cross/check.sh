@@ -17,7 +17,7 @@ mkdir -p "$root/target/cross"
 for target in "${targets[@]}"; do
   if ! compgen -G "$(rustc --print target-libdir --target "$target")/libstd-*" >/dev/null; then
     leave_out 1 "$target: no standard library (rustup target add $target)"
-  elif CARGO_TARGET_DIR="$root/target/cross/check" cargo check --release -q -p upt --target "$target" >"$log" 2>&1; then
+  elif CARGO_TARGET_DIR="$root/target/cross/check" cargo check --release -q -p libupt --target "$target" >"$log" 2>&1; then
     pass "$target: the library compiles ($(grep -c '^warning: ' "$log" || true) warnings); it was never run"
   else
     tail -n 20 "$log"

@@ -24,7 +24,7 @@ cargo_cross() {
 
 # The library and the command, without mesh files and sparse factorisation: half of the compiling.
 echo "== build"
-cargo_cross build --release -q -p upt -p upt-cli --no-default-features
+cargo_cross build --release -q -p libupt -p upt-cli --no-default-features
 out="$root/target/cross/build/$UPT_CROSS_TRIPLE/release"
 prepare "$out"
 
@@ -42,7 +42,7 @@ tests_in() {
 
 echo "== unit tests"
 if [ "$nightly" = 1 ]; then
-  unit_tests -p upt -p tissue -p elements -p contact -p exchange -p lanes --no-default-features --features upt/default --lib --tests
+  unit_tests -p libupt -p tissue -p libupt-elements -p libupt-contact -p libupt-exchange -p libupt-lanes --no-default-features --features libupt/default --lib --tests
   echo "== equilibria, by the sparse factorisation"
   unit_tests -p tissue --lib
 else

@@ -69,7 +69,7 @@ def fault(words: list[str]) -> str:
         return missing(cli().get(name, ""), words, name)
     if words[0] == "cargo":
         packages = [words[i + 1] for i, word in enumerate(words[:-1]) if word in ("-p", "--package")]
-        known = {"upt"} | {re.search(r'name = "([^"]+)"', p.read_text())[1] for p in ROOT.glob("*/*/Cargo.toml")}
+        known = {"libupt"} | {re.search(r'name = "([^"]+)"', p.read_text())[1] for p in ROOT.glob("*/*/Cargo.toml")}
         absent = [package for package in packages if package not in known]
         return f"no package is called {absent[0]}" if absent else ""
     if re.fullmatch(r"python3?", words[0]) and words[1:2] == ["-m"] and words[2].startswith("upt_training"):

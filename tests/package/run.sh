@@ -99,5 +99,8 @@ unity_complete() {
 }
 check unity_complete unity_complete
 
+# shellcheck source=tests/package/crates.sh
+source "$root/tests/package/crates.sh"
+
 echo "$passed passed, $failed failed, 0 skipped"
 [ "$failed" -eq 0 ]

@@ -30,14 +30,14 @@ count_tests() {
 
 loom() {
   echo "== loom: the exchange between the steps and a hand"
-  RUSTFLAGS="--cfg loom" tests loom cargo test --release -p exchange --tests --target-dir "$build/loom"
+  RUSTFLAGS="--cfg loom" tests loom cargo test --release -p libupt-exchange --tests --target-dir "$build/loom"
 }
 
 miri() {
   local file=crates/exchange/tests/exchange.rs
   echo "== Miri: the exchange"
   if grep -q '^miri' <<<"$components" && grep -q '^rust-src' <<<"$components"; then
-    tests miri cargo +nightly miri test -p exchange --tests --target-dir "$build/miri"
+    tests miri cargo +nightly miri test -p libupt-exchange --tests --target-dir "$build/miri"
   else
     leave_out "$(count_tests "$file")" "tests under Miri: no nightly toolchain with miri and rust-src"
   fi
@@ -52,9 +52,9 @@ thread_sanitizer() {
       RUSTFLAGS=-Zsanitizer=thread cargo +nightly test --release -Zbuild-std --target x86_64-unknown-linux-gnu \
         --no-fail-fast --target-dir "$build/tsan" "$@"
     }
-    tests tsan-exchange sanitized -p exchange --tests
+    tests tsan-exchange sanitized -p libupt-exchange --tests
     # A program that reported a race ends with an error, which counts as a failure.
-    tests tsan-upt sanitized -p upt "${suites[@]/#/--test=}"
+    tests tsan-upt sanitized -p libupt "${suites[@]/#/--test=}"
     grep -h -A 12 'WARNING: ThreadSanitizer' "$logs"/tsan-*.log | cut -c1-200 || true
   else
     local files

@@ -15,12 +15,12 @@ alone() {
 }
 
 lint --workspace
-alone upt "" instruments learned
+alone libupt "" instruments learned
 alone tissue "" files linear
 alone upt-cli "" files # the first is the demo's
 alone upt-study ""
 if compgen -G "$(rustc --print target-libdir --target wasm32-unknown-unknown)/libstd-*" >/dev/null; then
-  check "clippy for WebAssembly" cargo clippy --release --package upt --lib --target wasm32-unknown-unknown --no-default-features \
+  check "clippy for WebAssembly" cargo clippy --release --package libupt --lib --target wasm32-unknown-unknown --no-default-features \
     --features instruments -- -D warnings
 else
   leave_out 1 "clippy for WebAssembly: rustup target add wasm32-unknown-unknown"

@@ -30,7 +30,7 @@ mkdir -p "$out" "$stage"/upt/{ort,bundles,cases,training} "$stage/wheel"
 out=$(cd "$out" && pwd)
 
 if [ -z "${UPT_GPU_BINARIES:-}" ]; then
-  (cd "$root" && cargo build --quiet --release -p upt-cli -p upt-study && cargo build --quiet --release -p upt --example gpu-measure)
+  (cd "$root" && cargo build --quiet --release -p upt-cli -p upt-study && cargo build --quiet --release -p libupt --example gpu-measure)
   UPT_GPU_BINARIES="$target/release $target/release/examples"
 fi
 for command in upt upt-study gpu-measure; do

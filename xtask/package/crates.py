@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 
 # Library and command, as the archive has them.
-ALL = ("-p", "upt", "-p", "upt-cli")
+ALL = ("-p", "libupt", "-p", "upt-cli")
 
 
 @dataclass

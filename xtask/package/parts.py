@@ -68,14 +68,14 @@ def words(package: Path) -> tuple[str, ...]:
         return (*crates.ALL, "--target", TARGETS[found[1]])
     if re.fullmatch(r"libupt-[^-]+\.tgz", name):
         features = ("--no-default-features", "--features", "instruments")
-        return ("-p", "upt", *features, "--target", "wasm32-unknown-unknown")
+        return ("-p", "libupt", *features, "--target", "wasm32-unknown-unknown")
     if name.startswith("org.libupt."):
-        return ("-p", "upt")
+        return ("-p", "libupt")
     if name.endswith(".whl"):
         target = next(
             target for tag, target in TARGETS.items() if name.endswith(f"_{tag}.whl") or f"-{tag}.whl" in name
         )
-        return ("-p", "upt", "--target", target)
+        return ("-p", "libupt", "--target", target)
     raise SystemExit(f"{name} is no package of `cargo xtask package`")
 
 

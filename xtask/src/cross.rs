@@ -55,7 +55,7 @@ pub fn configure(workspace: &Workspace, platform: Platform, command: &mut Comman
         .env("UPT_CROSS_PREFIX", cross.prefix);
 }
 
-/// Builds packages, as `-p upt -p upt-cli` (library and command); the folder with what they make.
+/// Builds packages, as `-p libupt -p upt-cli` (library and command); the folder with what they make.
 pub fn build(workspace: &Workspace, platform: Platform, packages: &str) -> Result<PathBuf> {
     let (Some(cross), Ok(Platform::LinuxX64)) = (of(platform), Platform::host()) else {
         let name = platform.name();

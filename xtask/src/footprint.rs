@@ -40,7 +40,7 @@ pub fn run(workspace: &Workspace, page: Option<&Path>) -> Result<bool> {
 
 fn build(workspace: &Workspace, features: &str) -> Result<Build> {
     let mut cargo = workspace.cargo(
-        "rustc --release --package upt --lib --crate-type cdylib --no-default-features --features",
+        "rustc --release --package libupt --lib --crate-type cdylib --no-default-features --features",
     );
     let label = format!("libupt with features \"{features}\"");
     run_checked(workspace, &label, cargo.arg(features))?;

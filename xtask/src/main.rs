@@ -4,6 +4,7 @@
 mod archive;
 mod bench;
 mod counts;
+mod crates;
 mod cross;
 mod demo;
 mod evidence;

@@ -1,5 +1,5 @@
 //! `cargo xtask package`: a relocatable archive for C and C++ hosts, the Unity package, the wheel, and the npm package (`web.rs`). Beside each lie
-//! its bills of materials and checksums (`sbom.rs`).
+//! its bills of materials and checksums (`sbom.rs`). `crates.rs` makes what Rust's registry takes: source, with no bill of its own.
 //!
 //! ```text
 //! libupt-VERSION-PLATFORM/
@@ -20,7 +20,7 @@ use crate::ort::{self, Platform};
 use crate::process::run_checked;
 use crate::system::has_program;
 use crate::workspace::{Workspace, copy, library};
-use crate::{archive, cross, sbom, venv, web, wheel};
+use crate::{archive, crates, cross, sbom, venv, web, wheel};
 
 #[derive(Args)]
 pub struct Options {
@@ -31,6 +31,7 @@ pub struct Options {
     #[arg(long, conflicts_with = "unity")]
     wheel: bool,
     /// For another platform, with its ONNX Runtime: built here for Windows and Linux arm64; for macOS laid out only. `web`: the npm package.
+    /// `crates`: the library and its layers as Rust's registry takes them.
     #[arg(long, value_parser = wanted)]
     platform: Option<Wanted>,
     /// Folder for the result.
@@ -38,16 +39,18 @@ pub struct Options {
     out: PathBuf,
 }
 
-/// A platform of its own, or any browser.
+/// A platform of its own, any browser, or the source.
 #[derive(Clone, Copy)]
 enum Wanted {
     Native(Platform),
     Web,
+    Crates,
 }
 
 fn wanted(text: &str) -> Result<Wanted, String> {
     match text {
         "web" => Ok(Wanted::Web),
+        "crates" => Ok(Wanted::Crates),
         name => Platform::from_str(name, false).map(Wanted::Native),
     }
 }
@@ -55,13 +58,19 @@ fn wanted(text: &str) -> Result<Wanted, String> {
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let out = workspace.root.join(&options.out);
     std::fs::create_dir_all(&out)?;
+    if let Some(Wanted::Crates) = options.platform {
+        for made in crates::package(workspace, &out)? {
+            println!("{}", made.display());
+        }
+        return Ok(true);
+    }
     venv::create(workspace, "target/venv")?;
     let platform = match options.platform {
         Some(Wanted::Web) => {
             return finish(workspace, web::package(workspace, &out)?);
         }
         Some(Wanted::Native(platform)) => platform,
-        None => Platform::host()?,
+        Some(Wanted::Crates) | None => Platform::host()?,
     };
     let made = match (options.wheel, options.unity) {
         (true, _) => wheel::make(workspace, platform, &out)?,
@@ -134,7 +143,7 @@ fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathB
     } else {
         let built = match is_host {
             true => workspace.build().map(|()| workspace.release.clone())?,
-            false => cross::build(workspace, platform, "-p upt -p upt-cli")?,
+            false => cross::build(workspace, platform, "-p libupt -p upt-cli")?,
         };
         install(workspace, (!is_host).then_some(platform), &built, &root)?;
         let program = if windows { "upt.exe" } else { "upt" };

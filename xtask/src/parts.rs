@@ -11,7 +11,7 @@ use crate::workspace::Workspace;
 impl Workspace {
     /// `libupt.so`, the static library, the command `upt` and the study, in the release profile that the tests use too.
     pub fn build(&self) -> Result<()> {
-        let mut command = self.cargo("build --release -p upt -p upt-cli -p upt-study");
+        let mut command = self.cargo("build --release -p libupt -p upt-cli -p upt-study");
         run_checked(self, "cargo build", &mut command)
     }
 

@@ -38,7 +38,7 @@ pub fn run(workspace: &Workspace, arguments: &[String]) -> Result<bool> {
         "cargo build (rapier)",
         &mut workspace.cargo(&rapier),
     )?;
-    let own = "build --quiet --release -p upt -p upt-cli";
+    let own = "build --quiet --release -p libupt -p upt-cli";
     run_checked(workspace, "cargo build (libupt)", &mut workspace.cargo(own))?;
 
     let mut study = Command::new(&python);

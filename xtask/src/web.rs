@@ -58,7 +58,7 @@ fn module(workspace: &Workspace, features: &str) -> Result<PathBuf> {
         "Rust's standard library for {TARGET} is missing: rustup target add {TARGET}"
     );
     let words = format!(
-        "rustc --profile web --lib --crate-type cdylib --target {TARGET} -p upt --no-default-features --features {features}"
+        "rustc --profile web --lib --crate-type cdylib --target {TARGET} -p libupt --no-default-features --features {features}"
     );
     run_checked(
         workspace,

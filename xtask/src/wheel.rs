@@ -17,7 +17,7 @@ pub fn make(workspace: &Workspace, platform: Platform, out: &Path) -> Result<Pat
     let host = Platform::host()? == platform;
     let built = match host {
         true => workspace.build().map(|()| workspace.release.clone())?,
-        false => cross::build(workspace, platform, "-p upt")?,
+        false => cross::build(workspace, platform, "-p libupt")?,
     };
     venv::create(workspace, "target/venv")?;
     let scratch = workspace.path("target/python/wheel");

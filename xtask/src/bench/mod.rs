@@ -136,7 +136,7 @@ fn random_bundles(workspace: &Workspace, folder: &Path) -> Result<()> {
 /// Bench targets of `benches/` and `crates/tissue/benches/` (files, and folders with a `main.rs`), and the C# side.
 fn targets(workspace: &Workspace) -> Result<Vec<Target>> {
     let mut found = vec![(UNITY, "overhead".into())];
-    for (package, folder) in [("upt", "benches"), ("tissue", "crates/tissue/benches")] {
+    for (package, folder) in [("libupt", "benches"), ("tissue", "crates/tissue/benches")] {
         for entry in std::fs::read_dir(workspace.path(folder))? {
             let path = entry?.path();
             let is_file = path.extension().is_some_and(|extension| extension == "rs");
