@@ -1,25 +1,46 @@
-"""Builds the wheel: libupt by cargo into the package, one wheel for every Python 3 of a platform.
+"""Builds the wheel: libupt by cargo into the package, one wheel for every Python 3 of a platform; and the sdist,
+which holds libupt's source as crates.io has it (`rust/`).
 
 UPT_WHEEL_LIBRARY takes a libupt that is built already, and UPT_WHEEL_PLATFORM the platform tag that goes with it:
 so `cargo xtask package --wheel --platform ...` makes wheels for other platforms.
 """
 
+import hashlib
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
 from pathlib import Path
 
 from setuptools import setup
 from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
+from setuptools.command.sdist import sdist
 from setuptools.dist import Distribution
 
-ROOT = Path(__file__).resolve().parent.parent
-BUILD = ROOT / "target" / "python"
+HERE = Path(__file__).resolve().parent
+CLONE = HERE.parent
+#: An sdist is no clone: it holds the packages of libupt and its layers.
+RUST = HERE / "rust"
+IS_CLONE = not RUST.is_dir()
+BUILD = CLONE / "target" / "python" if IS_CLONE else HERE / "build"
 BUILD.mkdir(parents=True, exist_ok=True)
+
+#: The organ in the package.
+ORGAN = "liver-coarse"
+
+
+def source() -> Path:
+    """The folder of the crate `libupt`."""
+    if IS_CLONE:
+        if not (CLONE / "Cargo.toml").exists():
+            raise SystemExit(f"{CLONE} is not the libupt repository: install from a clone, an sdist or a wheel")
+        return CLONE
+    return next(RUST.glob("libupt-[0-9]*"))
 
 
 def library() -> Path:
@@ -27,14 +48,12 @@ def library() -> Path:
     stated = os.environ.get("UPT_WHEEL_LIBRARY")
     if stated:
         return Path(stated)
-    if not (ROOT / "Cargo.toml").exists():
-        raise SystemExit(f"{ROOT} is not the libupt repository: install from a clone, or from a wheel")
     if not shutil.which("cargo"):
         raise SystemExit("cargo is missing: libupt is built by Rust 1.92 or later (https://rustup.rs)")
-    subprocess.run(["cargo", "build", "--release", "--package", "libupt"], cwd=ROOT, check=True)
+    subprocess.run(["cargo", "build", "--release", "--package", "libupt"], cwd=source(), check=True)
     target = Path(os.environ.get("CARGO_TARGET_DIR", "target"))
     name = {"win32": "upt.dll", "darwin": "libupt.dylib"}.get(sys.platform, "libupt.so")
-    return (ROOT / target / "release" / name).resolve()
+    return (source() / target / "release" / name).resolve()
 
 
 def platform_tag(file: Path) -> str:
@@ -48,15 +67,30 @@ def platform_tag(file: Path) -> str:
     return f"manylinux_{major}_{minor}_{tag.removeprefix('linux_')}"
 
 
+def organs(to: Path) -> None:
+    """The organ of the package, and the hashes by which `upt.download` knows the others."""
+    shutil.rmtree(to, ignore_errors=True)
+    if not IS_CLONE:
+        shutil.copytree(HERE / "organs", to)
+        return
+    bundles = CLONE / "onnx"
+    shutil.copytree(bundles / ORGAN, to / ORGAN, ignore=shutil.ignore_patterns("*.html"))
+    found = sorted(bundles.glob("*/bundle.json"))
+    index = {file.parent.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in found}
+    (to / "index.json").write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
+
+
 class WithLibrary(build_py):
     def run(self) -> None:
         super().run()
-        source = library()
+        built = library()
         # `upt.dll`, `libupt.so`, `libupt.dylib`: without the version that CMake appends elsewhere.
-        folder = Path(self.build_lib) / "upt" / "lib"
+        package = Path(self.build_lib) / "upt"
+        folder = package / "lib"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        shutil.copy2(source, folder / source.name)
+        shutil.copy2(built, folder / built.name)
+        organs(package / "organs")
 
 
 class PlatformWheel(bdist_wheel):
@@ -68,15 +102,39 @@ class PlatformWheel(bdist_wheel):
         return "py3", "none", platform_tag(library())
 
 
+class WithSource(sdist):
+    def make_release_tree(self, base_dir: str, files: list[str]) -> None:
+        super().make_release_tree(base_dir, files)
+        organs(Path(base_dir, "organs"))
+        rust = Path(base_dir, "rust")
+        told = subprocess.run(
+            ["cargo", "metadata", "--format-version", "1", "--no-deps"], cwd=CLONE, capture_output=True, check=True
+        )
+        names = [one["name"] for one in json.loads(told.stdout)["packages"] if one["publish"] is None]
+        chosen = [word for name in names for word in ("--package", name)]
+        scratch = BUILD / "crates"
+        quietly = ["cargo", "package", "--quiet", "--no-verify", "--allow-dirty", "--target-dir", str(scratch)]
+        subprocess.run([*quietly, *chosen], cwd=CLONE, check=True)
+        patches = ["[patch.crates-io]"]
+        for crate in sorted((scratch / "package").glob("*.crate")):
+            with tarfile.open(crate) as archive:
+                archive.extractall(rust, filter="data")
+            patches.append(f"{crate.stem.rpartition('-')[0]} = {{ path = '{crate.stem}' }}")
+        shutil.rmtree(scratch)
+        # The layers beside the library, in place of a registry.
+        (rust / ".cargo").mkdir()
+        (rust / ".cargo" / "config.toml").write_text("\n".join(patches) + "\n", encoding="utf-8")
+
+
 class Binary(Distribution):
     def has_ext_modules(self) -> bool:
         return True
 
 
-version = re.search(r'^version = "(.+)"', (ROOT / "Cargo.toml").read_text(), re.M)
+version = re.search(r'^version = "(.+)"', (source() / "Cargo.toml").read_text(encoding="utf-8"), re.M)
 setup(
     version=version[1] if version else "0",
     distclass=Binary,
-    cmdclass={"build_py": WithLibrary, "bdist_wheel": PlatformWheel},
+    cmdclass={"build_py": WithLibrary, "bdist_wheel": PlatformWheel, "sdist": WithSource},
     options={"build": {"build_base": str(BUILD)}, "egg_info": {"egg_base": str(BUILD)}},
 )

@@ -2,7 +2,7 @@
 
     import upt
 
-    model = upt.Model(upt.bundle("brain-reduced"))
+    model = upt.Model(upt.bundle("liver-coarse"))  # in the package
     scene = model.scene()
     u = scene.step(contacts=([17, 18], [[0, 0, -4], [0, 0, -4]]))  # [K, 3], mm, 50 ms later
 
@@ -44,6 +44,7 @@ from upt._native import (
 from upt.batch import BatchedScenes
 from upt.bundles import bundle
 from upt.cuts import Surface
+from upt.download import download
 from upt.errors import (
     ArgumentError,
     BundleError,
@@ -126,6 +127,7 @@ __all__ = [
     "UnsupportedError",
     "ViewKind",
     "bundle",
+    "download",
     "init",
     "providers",
     "set_log",

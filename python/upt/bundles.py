@@ -1,40 +1,49 @@
-"""The bundles that ship with libupt, by name."""
+"""Bundles by name: the organ in this package, those of a clone, and those that were downloaded."""
 
 from __future__ import annotations
 
 import json
+import os
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
+#: What the wheel holds: one organ, and the hashes of those that `upt.download` fetches.
+ORGANS = Path(__file__).resolve().parent / "organs"
+
 
 def bundle(name: str) -> Path:
-    """The folder of a bundle that ships, from wherever it is asked: `upt.Model(upt.bundle("brain-reduced"))`.
+    """The folder of a bundle, from wherever it is asked: `upt.Model(upt.bundle("liver-coarse"))`.
 
-    Bundles are too large for the package: they are in the clone of libupt that it was installed from.
+    `liver-coarse` is in the package. Others are too large for it: they are in the clone of libupt that the package was
+    installed from, or where `upt.download` has put them.
 
     Raises:
-        FileNotFoundError: there is no such bundle, or the package did not come from a clone.
+        FileNotFoundError: there is no such bundle here; the message names those that are.
     """
-    roots = _clones()
+    roots = [ORGANS, *(root / "onnx" for root in _clones()), downloads()]
     for root in roots:
-        if (root / "onnx" / name / "bundle.json").is_file():
-            return root / "onnx" / name
-    known = sorted(path.parent.name for root in roots for path in (root / "onnx").glob("*/bundle.json"))
-    if known:
-        raise FileNotFoundError(f"no bundle that ships is called {name!r}; there are {', '.join(known)}")
+        if (root / name / "bundle.json").is_file():
+            return root / name
+    known = sorted({path.parent.name for root in roots for path in root.glob("*/bundle.json")})
+    here = f"there are {', '.join(known)}" if known else "there is none"
     raise FileNotFoundError(
-        f"bundle {name!r}: this package was not installed from a clone of libupt, or the clone is gone; "
-        "give upt.Model the path of a bundle's folder"
+        f"no bundle here is called {name!r}; {here}. Give upt.Model the path of a bundle's folder, or see upt.download"
     )
+
+
+def downloads() -> Path:
+    """Where downloaded bundles lie: `upt/bundles` in the user's cache folder, as the command `upt` has it."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    return (Path(home) if home else Path.home() / ".cache") / "upt" / "bundles"
 
 
 def _clones() -> list[Path]:
     """Where the package came from: pip keeps that; a package that is used in place lies there."""
     found = [Path(__file__).resolve().parents[2]]
     try:
-        kept = distribution("upt").read_text("direct_url.json")
+        kept = distribution("libupt").read_text("direct_url.json")
     except PackageNotFoundError:
         kept = None
     if kept:

@@ -120,6 +120,8 @@ def version_of(file: str, pattern: str) -> str:
 
 def bundle_licence(name: str) -> str:
     """A bundle's own licence and that of the surface that it was made of; NOTICE says which."""
+    if name == "block":
+        return f"({OURS})"
     surfaces = {"brain": FREESURFER, "liver": "LGPL-2.1-or-later"}
     found = surfaces.get(name.partition("-")[0])
     if not found:

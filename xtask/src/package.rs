@@ -31,7 +31,7 @@ pub struct Options {
     #[arg(long, conflicts_with = "unity")]
     wheel: bool,
     /// For another platform, with its ONNX Runtime: built here for Windows and Linux arm64; for macOS laid out only. `web`: the npm package.
-    /// `crates`: the library and its layers as Rust's registry takes them.
+    /// `crates`: the library and its layers as Rust's registry takes them. `sdist`: the source as Python's does.
     #[arg(long, value_parser = wanted)]
     platform: Option<Wanted>,
     /// Folder for the result.
@@ -45,12 +45,14 @@ enum Wanted {
     Native(Platform),
     Web,
     Crates,
+    Sdist,
 }
 
 fn wanted(text: &str) -> Result<Wanted, String> {
     match text {
         "web" => Ok(Wanted::Web),
         "crates" => Ok(Wanted::Crates),
+        "sdist" => Ok(Wanted::Sdist),
         name => Platform::from_str(name, false).map(Wanted::Native),
     }
 }
@@ -68,6 +70,9 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let platform = match options.platform {
         Some(Wanted::Web) => {
             return finish(workspace, web::package(workspace, &out)?);
+        }
+        Some(Wanted::Sdist) => {
+            return finish(workspace, wheel::source(workspace, &out)?);
         }
         Some(Wanted::Native(platform)) => platform,
         Some(Wanted::Crates) | None => Platform::host()?,

@@ -30,6 +30,9 @@ pub const SBOM: Set = (
     None,
 );
 
+/// What builds an sdist, and a wheel from it without an environment of its own.
+pub const SDIST: Set = ("sdist", "setuptools>=77 wheel", None);
+
 /// The package `training/` with its test extra, editable.
 pub const TRAINING: Set = (
     "training",

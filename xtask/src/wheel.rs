@@ -1,4 +1,4 @@
-//! The Python package `python/`: its wheel, and the stage that installs the wheel into an environment of its own and
+//! The Python package `python/`: its wheel, its sdist, and the stage that installs the wheel into an environment of its own and
 //! tests it there.
 
 use std::path::{Path, PathBuf};
@@ -40,6 +40,44 @@ pub fn make(workspace: &Workspace, platform: Platform, out: &Path) -> Result<Pat
     Ok(place)
 }
 
+/// The source of package and library, with an organ, in `out`.
+pub fn source(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
+    venv::install(workspace, venv::SDIST)?;
+    let mut command = workspace.python("-c");
+    command
+        .arg("import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])")
+        .arg(out)
+        .current_dir(workspace.path("python"));
+    run_checked(workspace, "sdist", &mut command)?;
+    Ok(out.join(format!("libupt-{}.tar.gz", env!("CARGO_PKG_VERSION"))))
+}
+
+/// The sdist, unpacked where no clone is: cargo finds all of the library's source offline, and a wheel is made from it, in a nightly run with
+/// a library that is built there.
+fn source_stage(workspace: &Workspace, out: &Path) -> Result<Outcome> {
+    let place = workspace.path("target/python/source");
+    std::fs::remove_dir_all(&place).ok();
+    std::fs::create_dir_all(&place)?;
+    let file = source(workspace, out)?;
+    let mut unpack = workspace.command("tar", "-xzf");
+    unpack.arg(file).arg("-C").arg(&place);
+    run_checked(workspace, "tar", &mut unpack)?;
+    let version = format!("libupt-{}", env!("CARGO_PKG_VERSION"));
+    let package = place.join(&version);
+    let mut tree = workspace.cargo("tree --offline --quiet --package libupt");
+    tree.current_dir(package.join("rust").join(&version));
+    let found = check(workspace, "source of the sdist", &mut tree)?;
+    let words = "-m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation . --wheel-dir ../wheel";
+    let mut command = workspace.python(words);
+    command.current_dir(&package);
+    if std::env::var_os("UPT_NIGHTLY").is_none() {
+        let built = workspace.release.join(library(Platform::host()?));
+        command.env("UPT_WHEEL_LIBRARY", built);
+    }
+    let wheel = check(workspace, "wheel from the sdist", &mut command)?;
+    Ok(found.and(wheel))
+}
+
 /// `cargo xtask test --only wheel`.
 pub fn stage(workspace: &Workspace) -> Result<Outcome> {
     let out = workspace.path("target/package");
@@ -64,5 +102,5 @@ pub fn stage(workspace: &Workspace) -> Result<Outcome> {
         .env_remove("ORT_DYLIB_PATH")
         .env_remove("UPT_LIBRARY");
     let tests = counted(workspace, "pytest of the wheel", &mut command, summary)?;
-    Ok(types.and(tests))
+    Ok(types.and(tests).and(source_stage(workspace, &out)?))
 }
