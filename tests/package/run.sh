@@ -78,6 +78,22 @@ bundle="$(find "$prefix/share/upt/bundles" -mindepth 1 -maxdepth 1 -type d 2>/de
 check cmake_configure cmake -S "$prefix/share/upt/examples/c" -B "$work/c" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release
 check cmake_build cmake --build "$work/c"
 check c_example "$work/c/minimal" "$bundle" 20
+# The archive as a project fetches it, by its hash.
+fetch_content() {
+  local hash
+  hash="$(sha256sum "$archive" | cut -d ' ' -f 1)"
+  mkdir -p "$work/fetch" && cp "$prefix/share/upt/examples/c/minimal.c" "$work/fetch/" || return 1
+  {
+    echo 'cmake_minimum_required(VERSION 3.16)'
+    echo 'project(fetch C)'
+    sed -n '/^include(FetchContent)/,/^```/p' "$root/docs/guide/c.md" | sed '/^```/d' \
+      | sed "s#URL /[^ ]*#URL \"$archive\"#; s#SHA256=[^)]*#SHA256=$hash#"
+    echo 'add_executable(minimal minimal.c)'
+    echo 'target_link_libraries(minimal PRIVATE upt::upt m)'
+  } >"$work/fetch/CMakeLists.txt"
+  cmake -S "$work/fetch" -B "$work/fetch/build" && cmake --build "$work/fetch/build" && "$work/fetch/build/minimal" "$bundle" 20
+}
+check fetch_content fetch_content
 pkg_config_build() {
   # shellcheck disable=SC2046 # the flags are words
   PKG_CONFIG_PATH="$prefix/lib/pkgconfig" cc "$prefix/share/upt/examples/c/minimal.c" -o "$work/minimal-pc" \
