@@ -16,6 +16,7 @@
 
 mod fall_back;
 mod freely;
+mod recover;
 mod rounds;
 mod whole;
 
@@ -163,11 +164,8 @@ impl ImplicitSolver {
         self.guess.copy_from_slice(at.u);
         problem.keep_guess()?;
         let mut size = self.improve_loaded(context, input, problem, at, report)?;
-        let sound = self.motion.min_det >= SMALLEST_DET && !input.still;
-        if !is_sound(size, at.det) && sound && !problem.work.is_spent() {
-            // The guess inverts, however short its parts: the tools push their way in by iterations alone.
-            self.stay(context, input, problem, at, report)?;
-            size = self.improve_loaded(context, input, problem, at, report)?;
+        if !is_sound(size, at.det) {
+            size = self.recover(context, input, problem, at, report)?;
         }
         let left = sunk(input, problem, at.u, 1.0);
         if !is_sound(size, at.det) || left > SUNK_MM {

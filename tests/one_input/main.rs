@@ -6,6 +6,7 @@
     reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
 )]
 
+mod all_together;
 mod beds;
 #[path = "../fixture/mod.rs"]
 mod fixture;

@@ -27,12 +27,13 @@ use upt_cli::effort::Effort;
 use upt_cli::marks::replace_between;
 use upt_cli::tool_scale;
 
-/// A programme by a bundle.
-#[derive(Serialize)]
+/// A programme by a bundle: of several cases the medians, the worst, and how far any of them goes.
+#[derive(Clone, Serialize)]
 struct Row {
     bundle: String,
     load: &'static str,
     tool: &'static str,
+    cases: usize,
     corrections: String,
     /// How far the solver's tissue goes in the support's frame, mm.
     farthest_mm: f64,
@@ -41,6 +42,7 @@ struct Row {
     worst_mse: f64,
     /// What forces on the tools are off by, over what they are; none without a tool.
     force_error: Option<f64>,
+    worst_force_error: Option<f64>,
     smallest_det: f64,
     /// Median, ms.
     step_ms: f64,
@@ -60,20 +62,19 @@ pub fn report(asked: &Options) -> Result<ExitCode> {
         let model = Model::open(path, &options).with_context(|| path.display().to_string())?;
         for programme in &asked.load {
             eprintln!("{}: {}", bundle.name, programme.name());
-            let truth = truth(asked, *programme, &mesh, boundary, &model)?;
+            let seeds = asked.seed..asked.seed + if asked.tool.is_some() { asked.seeds } else { 1 };
+            let truths: Vec<Trajectory> = seeds
+                .map(|seed| truth(asked, (*programme, seed), &mesh, boundary, &model))
+                .collect::<Result<_>>()?;
             let recommended = bundle.corrections.unwrap_or(Effort::NONE);
             let efforts = match asked.corrections.as_slice() {
                 [] => &[recommended],
                 efforts => efforts,
             };
             for effort in efforts {
-                rows.push(measure(
-                    asked,
-                    (*programme, *effort),
-                    &bundle,
-                    &model,
-                    &truth,
-                )?);
+                let case = |truth| measure(asked, (*programme, *effort), &bundle, &model, truth);
+                let cases: Vec<Row> = truths.iter().map(case).collect::<Result<_>>()?;
+                rows.push(joined(&cases)?);
             }
         }
     }
@@ -89,10 +90,30 @@ pub fn report(asked: &Options) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// One row of several cases.
+fn joined(cases: &[Row]) -> Result<Row> {
+    let first = cases.first().context("no case")?;
+    let medians = |value: fn(&Row) -> f64| median(cases.iter().map(value));
+    let largest = |value: fn(&Row) -> f64| cases.iter().map(value).fold(0.0, f64::max);
+    let force = |row: &Row| row.force_error.unwrap_or(0.0);
+    let has_force = cases.iter().any(|row| row.force_error.is_some());
+    Ok(Row {
+        cases: cases.len(),
+        farthest_mm: largest(|row| row.farthest_mm),
+        mse: medians(|row| row.mse),
+        worst_mse: largest(|row| row.worst_mse),
+        force_error: has_force.then(|| medians(force)),
+        worst_force_error: has_force.then(|| largest(force)),
+        smallest_det: cases.iter().map(|row| row.smallest_det).fold(1.0, f64::min),
+        step_ms: medians(|row| row.step_ms),
+        ..first.clone()
+    })
+}
+
 /// The reference solver's answer, with the bundle's material.
 fn truth(
     asked: &Options,
-    programme: LoadProgramme,
+    (programme, seed): (LoadProgramme, u64),
     mesh: &Mesh,
     boundary: Boundary,
     model: &Model,
@@ -109,7 +130,7 @@ fn truth(
             let order = ToolOrder {
                 load: Some(load),
                 scale: tool_scale::Chosen::of(tool_scale::Arguments::default(), mesh, None).scale,
-                ..ToolOrder::new(tool, asked.seed)
+                ..ToolOrder::new(tool, seed)
             };
             simulate_tools(mesh, boundary, order, &options, |_, _| {})
         }
@@ -224,11 +245,13 @@ fn measure(
         bundle: bundle.name.clone(),
         load: programme.name(),
         tool: asked.tool.map_or("none", |tool| tool.name()),
+        cases: 1,
         corrections: effort.to_string(),
         farthest_mm: farthest.sqrt(),
         mse: median(errors.iter().copied()),
         worst_mse: errors.iter().copied().fold(0.0, f64::max),
         force_error: (felt > 0.0).then(|| off / felt),
+        worst_force_error: None,
         smallest_det,
         step_ms: median(times),
     })
@@ -270,16 +293,22 @@ fn tools(truth: &Trajectory) -> Result<Vec<Tool>> {
     made.collect()
 }
 
-const COLUMNS: [Column<Row>; 10] = [
+const COLUMNS: [Column<Row>; 12] = [
     ("bundle", |row| format!("`{}`", row.bundle)),
     ("load", |row| row.load.into()),
     ("tool", |row| row.tool.into()),
+    ("cases", |row| row.cases.to_string()),
     ("k", |row| row.corrections.clone()),
     ("farthest, mm", |row| format!("{:.2}", row.farthest_mm)),
     ("MSE, mm² (median)", |row| format!("{:.2e}", row.mse)),
     ("worst", |row| format!("{:.2e}", row.worst_mse)),
-    ("force error", |row| {
+    ("force error (median)", |row| {
         or_dash(row.force_error, |error| format!("{:.1} %", 100.0 * error))
+    }),
+    ("worst force error", |row| {
+        or_dash(row.worst_force_error, |error| {
+            format!("{:.1} %", 100.0 * error)
+        })
     }),
     ("smallest det F", |row| format!("{:.2}", row.smallest_det)),
     ("ms a step", |row| format!("{:.1}", row.step_ms)),

@@ -39,6 +39,27 @@ impl ContactProblem {
         self.next.forces.extend_from_slice(&self.guessed);
     }
 
+    /// Keeps the forces as those of a state without inverted elements.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn keep_sound(&mut self) -> Result<()> {
+        memory::replace(&mut self.sound, &self.next.forces, WHAT)
+    }
+
+    /// Takes them back.
+    pub fn take_sound(&mut self) {
+        self.next.forces.clear();
+        self.next.forces.extend_from_slice(&self.sound);
+    }
+
+    /// Multiplies all forces of this step.
+    pub fn scale_forces(&mut self, factor: f32) {
+        for force in &mut self.next.forces {
+            force.force *= factor;
+        }
+    }
+
     /// Drops the forces of this step. What the last published step left stays.
     pub fn clear_forces(&mut self) {
         self.next.forces.clear();

@@ -96,6 +96,8 @@ pub struct ContactProblem {
     kept: Vec<Force>,
     /// Those of a step's first guess.
     guessed: Vec<Force>,
+    /// Those of a state without inverted elements, while a step that has lost its contact looks for a better one.
+    sound: Vec<Force>,
     /// Where the tools came from, while they take another way.
     ways: Vec<(Pose, bool, Option<Buried>)>,
     /// What the step may still cost.
@@ -147,6 +149,7 @@ impl ContactProblem {
             earlier: memory::room(room, WHAT)?,
             kept: memory::room(room, WHAT)?,
             guessed: memory::room(room, WHAT)?,
+            sound: memory::room(room, WHAT)?,
             ways: memory::room(MAX_TOOLS, WHAT)?,
             spent: Duration::ZERO,
             work: Work::new(),

@@ -283,7 +283,8 @@ impl ContactProblem {
         memory::fit(&mut self.columns, 9 * changed, WHAT)?;
         memory::fit(&mut self.change, 9 * changed, WHAT)?;
         let forces = rows + self.kept.len() + self.tied.list.len();
-        memory::fit(&mut self.next.forces, forces.max(self.guessed.len()), WHAT)?;
+        let guessed = self.guessed.len().max(self.sound.len());
+        memory::fit(&mut self.next.forces, forces.max(guessed), WHAT)?;
         memory::fit(&mut self.nodes, 3 * forces, WHAT)?;
         memory::fit(&mut self.vectors, 9 * forces, WHAT)
     }

@@ -2,7 +2,7 @@
 //!
 //! Work is counted and not timed, so that a step has the same bits on every machine; only a host's budget is a time.
 //!
-//! REQ-046: The work of the contact solves of a step is bounded for any poses of tools, and what they left unsolved is told by a flag.
+//! REQ-046: The work of the contact solves of a step is bounded for any poses of tools (twice that of a first guess where it is of no use), and what they left unsolved is told by a flag.
 
 use crate::clock::Instant;
 use crate::memory::HeldBytes;
@@ -43,6 +43,11 @@ impl Work {
             solves: solves + more,
             until: None,
         }
+    }
+
+    /// A step whose guess is of no use begins again.
+    pub fn renew(&mut self) {
+        self.solves = self.solves.max(SOLVES_WORK);
     }
 
     /// Takes off what a solve has cost.

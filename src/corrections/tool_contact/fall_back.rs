@@ -19,6 +19,10 @@ impl ImplicitSolver {
     ) -> Result<()> {
         report.fell_back = true;
         self.clear_pairs();
+        // A state whose elements are sound though its contact is lost.
+        let found_sound = at.det >= SMALLEST_DET;
+        self.d.copy_from_slice(at.u);
+        problem.keep_sound()?;
         problem.take_guess();
         at.u.copy_from_slice(&self.guess);
         let mut left = self.press_on(context, input, problem, SUNK_MM, at.u)?;
@@ -41,13 +45,19 @@ impl ImplicitSolver {
         problem.take_guess();
         at.u.copy_from_slice(&self.guess);
         self.evaluate(context, input, at, report)?;
-        // What a linear response of the intact body makes of loose lips is no tissue: a tool that has lost the contact there pushes its way in from
-        // the last state, in the steps that follow.
+        // What a linear response turns inside out is no tissue: a tool that has lost the contact there pushes its way in from a sound state, in the steps that
+        // follow.
         let found = at.det;
-        if context.corrections.changed.is_empty() || found >= SMALLEST_DET || input.still {
+        if found >= SMALLEST_DET {
             return Ok(());
         }
-        self.stay(context, input, problem, at, report)?;
+        if found_sound {
+            problem.take_sound();
+            at.u.copy_from_slice(&self.d);
+            self.evaluate(context, input, at, report)?;
+        } else if !input.still {
+            self.stay(context, input, problem, at, report)?;
+        }
         if at.det > found {
             return Ok(());
         }

@@ -75,9 +75,12 @@ pub struct Options {
     /// With --load: a tool that touches the body meanwhile.
     #[arg(long, value_parser = upt_cli::loads::programme(), requires = "load")]
     pub tool: Option<ToolProgramme>,
-    /// With --tool: seed of its case.
+    /// With --tool: seed of its first case.
     #[arg(long, default_value_t = 1, requires = "load")]
     pub seed: u64,
+    /// With --tool: so many cases, each at another site; a row of the table is their median.
+    #[arg(long, default_value_t = 1, requires = "tool", value_parser = clap::value_parser!(u64).range(1..))]
+    pub seeds: u64,
     #[command(flatten)]
     pub load_sizes: LoadArguments,
     /// The most cases of each scheme or programme.

@@ -1,0 +1,57 @@
+//! Where the first guess inverts elements, however short its parts: tools and ties push and pull their way by iterations alone, from a state that has none.
+//!
+//! The laws of the elements say nothing of what is inside out, so that no iteration leads out of it: a step that took such a state over would be the start of
+//! others (`docs/decisions/039-sound-states.md`).
+
+use super::Iterate;
+use crate::contact::ContactProblem;
+use crate::corrections::input::{Input, Report, SolverContext};
+use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
+use crate::error::Result;
+
+/// How often the way from rest to a guess is halved until its end has no inverted element.
+const HALVES: u32 = 8;
+/// Smallest det F of a state from rest that iterations begin with: one at the limit leaves them no way.
+const BEGUN_DET: f32 = 0.2;
+
+impl ImplicitSolver {
+    /// Iterates from the last state, or where that has inverted elements, too, from a part of the way from rest to the guess; returns the length of what is left
+    /// unbalanced near the tools.
+    pub(super) fn recover(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        problem: &mut ContactProblem,
+        at: &mut Iterate<'_>,
+        report: &mut Report,
+    ) -> Result<f64> {
+        problem.work.renew();
+        if self.motion.min_det >= SMALLEST_DET && !input.still {
+            self.stay(context, input, problem, at, report)?;
+            if !context.corrections.groups.is_empty() {
+                self.lift(context, input, Some(input.last), at.u)?;
+                self.evaluate(context, input, at, report)?;
+            }
+        } else {
+            // What the last state and this one make of a velocity is none.
+            report.fell_back = true;
+            problem.take_guess();
+            at.u.copy_from_slice(&self.guess);
+            self.d.fill(0.0);
+            let mut rest = std::mem::take(&mut self.d);
+            let lifted = self.lift(context, input, None, &mut rest);
+            self.d = rest;
+            lifted?;
+            for _ in 0..HALVES {
+                problem.scale_forces(0.5);
+                let pairs = at.u.iter_mut().zip(&self.d);
+                pairs.for_each(|(u, rest)| *u = 0.5 * (*u + rest));
+                self.evaluate(context, input, at, report)?;
+                if at.det >= BEGUN_DET {
+                    break;
+                }
+            }
+        }
+        self.improve_loaded(context, input, problem, at, report)
+    }
+}

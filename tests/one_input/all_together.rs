@@ -1,0 +1,194 @@
+//! All that holds and loads an organ at once, at random: gravity, pressure, a support that moves, a bed, ties and a ball.
+//!
+//! 160 steps; 10,000 with `UPT_NIGHTLY=1`. `UPT_FUZZ_SEED` is where their numbers begin. The counts are printed.
+
+use std::path::Path;
+
+use upt::contact::Tool;
+use upt::{
+    Bed, Contact, Corrections, Loads, Model, ModelOptions, Pressure, Scene, SceneOptions, Shape,
+    Spring, StepInput, SupportPose, Tie, TieEnd, TiePoint, Vector,
+};
+
+use crate::ties::place;
+
+/// Steps after which other ties take the place of those that there are, and the ball leaps.
+const TO_A_SITE: usize = 20;
+/// How far a new tie pulls at once, mm; every fourth the second. The bundle's bound is 32 mm.
+const PULLED_MM: [f32; 2] = [6.0, 28.0];
+
+struct Draw(u64);
+
+impl Draw {
+    fn next(&mut self) -> f32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    fn within(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.next()
+    }
+
+    fn aside(&mut self, most: f32) -> Vector {
+        Vector::from([0; 3].map(|_| self.within(-most, most)))
+    }
+
+    /// N/m.
+    fn stiffness(&mut self) -> f32 {
+        10f32.powf(self.within(0.5, 4.0))
+    }
+
+    fn node(&mut self, nodes: &[u32]) -> u32 {
+        nodes[(self.next() * nodes.len() as f32) as usize % nodes.len()]
+    }
+}
+
+#[derive(Debug, Default)]
+struct Counts {
+    steps: usize,
+    refused: usize,
+    not_finite: usize,
+    inverted: usize,
+    fell_back: usize,
+    broke: usize,
+    pushed: usize,
+}
+
+/// A tie of a node to the world, to another or to the ball at `ball`, that pulls by `pulled` mm.
+fn tie(scene: &Scene, draw: &mut Draw, domain: &[u32], ball: Vector, pulled: f32) -> Tie {
+    let (node, other) = (draw.node(domain), draw.node(domain));
+    let own = place(scene, node);
+    let (end, far) = match (3.0 * draw.next()) as u32 {
+        0 => {
+            let far = own + draw.aside(1.0).normalize_or_zero() * 40.0;
+            (TieEnd::World(far), far)
+        }
+        1 => {
+            let point = TiePoint {
+                nodes: [other; 3],
+                weights: [1.0, 0.0, 0.0],
+            };
+            (TieEnd::Tissue(point), place(scene, other))
+        }
+        _ => {
+            let place = Vector::ZERO;
+            (TieEnd::Tool { tool: 0, place }, ball)
+        }
+    };
+    Tie {
+        point: TiePoint {
+            nodes: [node; 3],
+            weights: [1.0, 0.0, 0.0],
+        },
+        end,
+        spring: Spring {
+            stiffness: draw.stiffness(),
+            slack_mm: (own.distance(far) - pulled).max(0.0),
+            ..Spring::default()
+        },
+        break_mn: [0.0, 80.0][(2.0 * draw.next()) as usize % 2],
+    }
+}
+
+/// Before, a guess that inverted elements once was taken for the state, and each step that started from it inverted some again.
+#[test]
+fn random_loads_together_invert_no_element() {
+    let number =
+        |name: &str, or: usize| std::env::var(name).map_or(or, |text| text.parse().unwrap_or(or));
+    let steps = match number("UPT_NIGHTLY", 0) {
+        0 => 160,
+        _ => 10_000,
+    };
+    let path = Path::new("onnx/brain-coarse-reduced");
+    let model = Model::open(path, &ModelOptions::default()).unwrap();
+    let options = SceneOptions {
+        corrections: Corrections::Fixed(10),
+        ..SceneOptions::default()
+    };
+    let scene = Scene::new(model, &options).unwrap();
+    let domain = scene.model().indices(upt::IndexSet::DomainNodes);
+    let mut draw = Draw(number("UPT_FUZZ_SEED", 0) as u64 + 48);
+    let mut counts = Counts::default();
+    let (mut ties, mut site, mut ball) = (Vec::new(), Vector::ZERO, Vector::ZERO);
+    let (mut gravity, mut lift) = ([0.0; 3], 0.0);
+    let shape = Shape::Sphere { radius: 4.0 };
+    for step in 0..steps {
+        if step % TO_A_SITE == 0 {
+            site = place(&scene, draw.node(domain));
+            ball = site + Vector::Z * 10.0;
+            let bed = Bed {
+                nodes: &[],
+                centre: site.to_array(),
+                radius_mm: draw.within(12.0, 20.0),
+                spring: Spring {
+                    stiffness: draw.stiffness(),
+                    damping: draw.next().round(),
+                    ..Spring::default()
+                },
+                break_mn: [0.0, 60.0, 300.0][(3.0 * draw.next()) as usize % 3],
+                offset: [0.0; 3],
+            };
+            ties = scene.bed(&bed).unwrap_or_default();
+            let pulled = PULLED_MM[usize::from(step / TO_A_SITE % 4 == 3)];
+            for _ in 0..2 {
+                ties.push(tie(&scene, &mut draw, domain, ball, pulled));
+            }
+        }
+        if draw.next() < 0.05 {
+            gravity = draw.aside(0.5).to_array();
+        }
+        ball += (site + draw.aside(3.0) - ball) * 0.1 + draw.aside(0.2);
+        lift += draw.within(-0.2, 0.2);
+        let mut tool = Tool::new(&shape, ball.to_array(), [0.0, 0.0, 0.0, 1.0]).unwrap();
+        tool.friction = 0.3;
+        let pressures = [Pressure {
+            nodes: &[],
+            pascal: 10.0 * (0.1 * step as f32).sin(),
+        }];
+        let loads = Loads {
+            gravity,
+            pressures: &pressures,
+            support: Some(SupportPose {
+                position: [0.0, 0.0, lift],
+                rotation: [0.0, 0.0, 0.0, 1.0],
+            }),
+            ties: &ties,
+            ..Loads::default()
+        };
+        let tools = [tool];
+        let input = StepInput {
+            contact: Contact::Tools(&tools),
+            loads,
+            ..StepInput::default()
+        };
+        let mut u = vec![f32::NAN; 3 * scene.node_count()];
+        counts.steps += 1;
+        if let Err(error) = scene.step(input, Some(&mut u)) {
+            println!("step {step}: {error}");
+            counts.refused += 1;
+            scene.reset().unwrap();
+            continue;
+        }
+        let stats = scene.stats();
+        counts.not_finite += usize::from(!u.iter().all(|x| x.is_finite()));
+        if stats.min_det < 0.0 {
+            println!("step {step}: {stats:?}");
+            counts.inverted += 1;
+        }
+        counts.fell_back += usize::from(stats.flags & upt::flag::FELL_BACK != 0);
+        let readings = scene.tie_readings().unwrap();
+        counts.broke += readings.iter().filter(|reading| reading.broke).count();
+        let force = scene.with_contact_report(|report| report.readings[0].force);
+        counts.pushed += usize::from(force != [0.0; 3]);
+    }
+    println!("{counts:?}");
+    assert!(
+        counts.pushed > steps / 3 && counts.broke > steps / 60,
+        "{counts:?}"
+    );
+    let wrong = [counts.not_finite, counts.inverted, counts.refused];
+    assert_eq!(wrong, [0; 3], "{counts:?}");
+}
