@@ -15,7 +15,7 @@ use crate::ties::place;
 /// Steps after which other ties take the place of those that there are, and the ball leaps.
 const TO_A_SITE: usize = 20;
 /// How far a new tie pulls at once, mm; every fourth the second. The bundle's bound is 32 mm.
-const PULLED_MM: [f32; 2] = [6.0, 28.0];
+const PULLED_MM: [f32; 2] = [6.0, 20.0];
 
 struct Draw(u64);
 
