@@ -199,7 +199,8 @@ pub fn row_dots(
     })
 }
 
-/// The same over some ranges of columns alone, each of a multiple of eight, on this thread.
+/// The same over some ranges of columns alone, each of a multiple of eight, on this thread, for `n` vectors `q [n,Q]` to `out [n,rows]`: the table
+/// is read once for three of them.
 ///
 /// # Panics
 /// As [`row_dots`].
@@ -211,8 +212,13 @@ pub fn row_dots_in(
     q: &[f32],
     out: &mut [f32],
 ) {
-    assert_eq!(rows.len(), out.len(), "one result a row");
-    let width = q.len();
+    if out.is_empty() {
+        return;
+    }
+    assert!(out.len().is_multiple_of(rows.len()), "one result a row");
+    let count = out.len() / rows.len();
+    assert!(q.len().is_multiple_of(count), "vectors of one length");
+    let width = q.len() / count;
     if let Some(&last) = rows.iter().max() {
         assert!((last as usize + 1) * width <= table.len(), "row {last}");
     }
@@ -240,18 +246,21 @@ fn range_scalar<T: Number>(
     q: &[f32],
     out: &mut [f32],
 ) {
-    for (&row, out) in rows.iter().zip(out) {
-        let row = &table[row as usize * q.len()..][..q.len()];
-        let mut lanes = [0.0f32; 8];
-        for range in ranges {
-            let (row, q) = (&row[range.clone()], &q[range.clone()]);
-            for (row, q) in row.chunks(8).zip(q.chunks(8)) {
-                for ((lane, a), b) in lanes.iter_mut().zip(row).zip(q) {
-                    *lane += a.wide() * b;
+    let width = q.len() / (out.len() / rows.len());
+    for (q, out) in q.chunks(width).zip(out.chunks_mut(rows.len())) {
+        for (&row, out) in rows.iter().zip(out) {
+            let row = &table[row as usize * width..][..width];
+            let mut lanes = [0.0f32; 8];
+            for range in ranges {
+                let (row, q) = (&row[range.clone()], &q[range.clone()]);
+                for (row, q) in row.chunks(8).zip(q.chunks(8)) {
+                    for ((lane, a), b) in lanes.iter_mut().zip(row).zip(q) {
+                        *lane += a.wide() * b;
+                    }
                 }
             }
+            *out = lanes.iter().sum();
         }
-        *out = lanes.iter().sum();
     }
 }
 
@@ -264,27 +273,62 @@ unsafe fn range_body<V: DenseLanes>(
     q: &[f32],
     out: &mut [f32],
 ) {
-    for (rows, out) in rows.chunks(4).zip(out.chunks_mut(4)) {
-        // SAFETY: `row_dots_in` has checked every row and range.
+    let width = q.len() / (out.len() / rows.len());
+    let (threes, rest) = out.split_at_mut(out.len() / rows.len() / 3 * 3 * rows.len());
+    let (q_threes, q_rest) = q.split_at(threes.len() / rows.len() * width);
+    // SAFETY: `row_dots_in` has checked every row and range.
+    unsafe {
+        for (q, out) in q_threes
+            .chunks(3 * width)
+            .zip(threes.chunks_mut(3 * rows.len()))
+        {
+            range_rows::<V, 3>(table, rows, ranges, q, out);
+        }
+        for (q, out) in q_rest.chunks(width).zip(rest.chunks_mut(rows.len())) {
+            range_rows::<V, 1>(table, rows, ranges, q, out);
+        }
+    }
+}
+
+/// `N` vectors of [`range_body`].
+#[inline(always)]
+unsafe fn range_rows<V: DenseLanes, const N: usize>(
+    table: &[impl Number],
+    all: &[u32],
+    ranges: &[Range<usize>],
+    q: &[f32],
+    out: &mut [f32],
+) {
+    let width = q.len() / N;
+    for start in (0..all.len()).step_by(4) {
+        let count = 4.min(all.len() - start);
+        // SAFETY: the caller's.
         unsafe {
             let row = |i: usize| {
-                let row = rows[i.min(rows.len() - 1)] as usize;
-                table.as_ptr().add(row * q.len())
+                let row = all[start + i.min(count - 1)] as usize;
+                table.as_ptr().add(row * width)
             };
             let rows = [row(0), row(1), row(2), row(3)];
-            let mut total = [V::splat(0.0); 4];
+            let mut total = [[V::splat(0.0); 4]; N];
             for range in ranges {
                 let mut at = range.start;
                 while at < range.end {
-                    let x = V::load(q.as_ptr().add(at));
+                    let mut x = [V::splat(0.0); N];
+                    for n in 0..N {
+                        x[n] = V::load(q.as_ptr().add(n * width + at));
+                    }
                     for i in 0..4 {
-                        total[i] = Number::lanes::<V>(rows[i].add(at)).mul_add(x, total[i]);
+                        let row = Number::lanes::<V>(rows[i].add(at));
+                        for n in 0..N {
+                            total[n][i] = row.mul_add(x[n], total[n][i]);
+                        }
                     }
                     at += V::COUNT;
                 }
             }
-            for (out, sum) in out.iter_mut().zip(V::sums(total)) {
-                *out = sum;
+            for n in 0..N {
+                let sums = V::sums(total[n]);
+                out[n * all.len() + start..][..count].copy_from_slice(&sums[..count]);
             }
         }
     }

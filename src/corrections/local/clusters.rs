@@ -80,18 +80,19 @@ impl Clusters {
             let Some(part) = part else {
                 continue;
             };
-            resize(&mut room.field, 3 * near.free)?;
-            resize(&mut room.linear, modes)?;
-            for (row, own) in own.chunks_exact_mut(modes).enumerate() {
-                let (i, j) = (row / 3, row % 3);
-                room.field.fill(0.0);
+            let field = 3 * near.free;
+            resize(&mut room.linear, 3 * modes)?;
+            for j in 0..3 {
+                resize(&mut room.field, 3 * field)?;
                 for &(place, weight) in near.parts.weights(part) {
-                    room.field[3 * place as usize + i] = weight[j];
+                    for i in 0..3 {
+                        room.field[i * field + 3 * place as usize + i] = weight[j];
+                    }
                 }
-                near.project(env, &room.field, &mut room.q);
-                room.find_used(near)?;
-                preconditioner.on_modes_in(env, &room.used, &room.q, &mut room.linear);
-                add(-1.0, &room.linear, own);
+                room.on_modes(env, (near, preconditioner), 3)?;
+                for (i, part) in room.linear.chunks_exact(modes.max(1)).enumerate() {
+                    add(-1.0, part, &mut own[(3 * i + j) * modes..][..modes]);
+                }
             }
         }
         Ok(())

@@ -24,6 +24,8 @@ pub(super) struct NearColumns {
     moved: Vec<f32>,
     on_modes: Vec<f32>,
     modes: Vec<f32>,
+    /// Columns that are being made.
+    made: Vec<u32>,
 }
 
 /// What columns are made with.
@@ -46,11 +48,7 @@ impl Tangent for Response<'_> {
             known.clear();
             known.generation = factor.generation;
         }
-        for &column in columns {
-            if !known.columns.contains(&column) {
-                known.push(self, factor, room, column)?;
-            }
-        }
+        known.make(self, factor, room, columns)?;
         let (size, modes) = (3 * self.near.core, self.env.space.count());
         let order = 3 * columns.len();
         let at = |column: u32| known.columns.iter().position(|c| *c == column).unwrap_or(0);
@@ -96,67 +94,96 @@ impl NearColumns {
         self.modes.clear();
     }
 
-    fn push(
+    /// Makes those columns that are not known.
+    fn make(
         &mut self,
         by: &Response<'_>,
         factor: &mut NearFactor,
         room: &mut Room,
-        column: u32,
+        columns: &[u32],
     ) -> Result<()> {
         let (env, near) = (by.env, by.near);
         let (size, modes) = (3 * near.core, env.space.count());
-        memory::reserve(&mut self.columns, 1, WHAT)?;
-        memory::reserve(&mut self.moved, 3 * size, WHAT)?;
-        memory::reserve(&mut self.on_modes, 3 * modes, WHAT)?;
-        memory::reserve(&mut self.modes, 3 * modes, WHAT)?;
-        let node = env.prior.contact_nodes[column as usize];
         // What an error has left half made is made anew.
-        let known = 3 * self.columns.len();
-        let (moved, on_modes) = (known * size, known * modes);
-        self.moved.truncate(moved);
-        self.on_modes.truncate(on_modes);
-        self.modes.truncate(on_modes);
-        self.moved.resize(moved + 3 * size, 0.0);
-        self.on_modes.resize(on_modes + 3 * modes, 0.0);
-        self.modes.resize(on_modes + 3 * modes, 0.0);
-        for axis in 0..3 {
-            let work = &mut self.on_modes[on_modes + axis * modes..][..modes];
-            if let Some(place) = near.place(node).filter(|place| *place < near.core) {
-                let t = &mut self.moved[moved + axis * size..][..size];
-                t[3 * place + axis] = 1e3;
-                factor.solve(env.isa, t);
-                // In the core the factor balances the force: nothing of it is left there.
-                resize(&mut room.field, 3 * near.free)?;
-                factor.take_off(env, near, by.preconditioner, room, (t, work))?;
-            } else {
-                let own = env.space.at_contact(3 * column as usize + axis);
-                for (work, own) in work.iter_mut().zip(own) {
-                    *work = 1e3 * own;
+        let known = self.columns.len();
+        self.moved.truncate(3 * known * size);
+        self.on_modes.truncate(3 * known * modes);
+        self.modes.truncate(3 * known * modes);
+        self.made.clear();
+        memory::fit(&mut self.made, columns.len(), WHAT)?;
+        let is_new = |column: &&u32| !self.columns.contains(column);
+        self.made.extend(columns.iter().filter(is_new));
+        let count = self.made.len();
+        memory::reserve(&mut self.columns, count, WHAT)?;
+        memory::reserve(&mut self.moved, 3 * count * size, WHAT)?;
+        memory::reserve(&mut self.on_modes, 3 * count * modes, WHAT)?;
+        memory::reserve(&mut self.modes, 3 * count * modes, WHAT)?;
+        self.moved.resize(3 * (known + count) * size, 0.0);
+        self.on_modes.resize(3 * (known + count) * modes, 0.0);
+        self.modes.resize(3 * (known + count) * modes, 0.0);
+        // Those of nodes in the core first: they need the factor.
+        let core = |column: u32| {
+            let place = near.place(env.prior.contact_nodes[column as usize]);
+            place.filter(|place| *place < near.core)
+        };
+        self.made.sort_by_key(|column| core(*column).is_none());
+        let in_core = self.made.iter().filter(|c| core(**c).is_some()).count();
+        let moved = &mut self.moved[3 * known * size..][..3 * in_core * size];
+        for (at, &column) in self.made[..in_core].iter().enumerate() {
+            let place = core(column).unwrap_or(0);
+            for axis in 0..3 {
+                moved[(3 * at + axis) * size + 3 * place + axis] = 1e3;
+            }
+        }
+        factor.solve_many(env.isa, moved);
+        let on_modes = self.on_modes[3 * known * modes..].chunks_exact_mut(3 * modes);
+        let responses = self.modes[3 * known * modes..].chunks_exact_mut(3 * modes);
+        for (at, (work, responses)) in on_modes.zip(responses).enumerate() {
+            let column = self.made[at];
+            match at < in_core {
+                true => {
+                    // In the core the factor balances the force: nothing of it is left there.
+                    resize(&mut room.field, 9 * near.free)?;
+                    let moved = &moved[3 * at * size..][..3 * size];
+                    factor.take_off(env, (near, by.preconditioner), room, (moved, work))?;
+                }
+                false => {
+                    for (axis, work) in work.chunks_exact_mut(modes).enumerate() {
+                        let own = env.space.at_contact(3 * column as usize + axis);
+                        for (work, own) in work.iter_mut().zip(own) {
+                            *work = 1e3 * own;
+                        }
+                    }
                 }
             }
-            let response = &mut self.modes[on_modes + axis * modes..][..modes];
-            by.preconditioner.respond_on_modes(env, work, response)?;
+            let axes = work.chunks_exact(modes);
+            for (work, response) in axes.zip(responses.chunks_exact_mut(modes)) {
+                by.preconditioner.respond_on_modes(env, work, response)?;
+            }
         }
-        self.columns.push(column);
+        self.columns.extend_from_slice(&self.made);
         Ok(())
     }
 }
 
 impl NearFactor {
-    /// `p` becomes `p - Phi^T K t` of a move `t [3 core]`, with what `K t` has in the core at the start of `room.field [3 free]`.
+    /// `p [n,r]` becomes `p - Phi^T K t` of up to three moves `t [n, 3 core]`, with what `K t` has in the core in `room.field [n, 3 free]`.
     pub fn take_off(
         &self,
         env: Env<'_>,
-        near: &NearSet,
-        preconditioner: &Preconditioner,
+        level: (&NearSet, &Preconditioner),
         room: &mut Room,
         (t, p): (&[f32], &mut [f32]),
     ) -> Result<()> {
+        let (free, modes) = (3 * level.0.free, env.space.count());
+        let count = p.len() / modes.max(1);
+        let core = t.len() / count.max(1);
+        for n in 0..count {
+            let field = &mut room.field[n * free..][..free];
+            self.around(&t[n * core..][..core], &mut field[core..]);
+        }
         resize(&mut room.linear, p.len())?;
-        self.around(t, &mut room.field[t.len()..]);
-        near.project(env, &room.field, &mut room.q);
-        room.find_used(near)?;
-        preconditioner.on_modes_in(env, &room.used, &room.q, &mut room.linear);
+        room.on_modes(env, level, count)?;
         add(-1.0, &room.linear, p);
         Ok(())
     }

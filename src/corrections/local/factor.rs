@@ -263,6 +263,11 @@ impl NearFactor {
         self.factor.solve(isa, t);
     }
 
+    /// The same of moves that follow each other, `[n, 3 C]`.
+    pub fn solve_many(&mut self, isa: Isa, t: &mut [f32]) {
+        self.factor.solve_many(isa, t);
+    }
+
     /// `out = K_RC t`, µN, at the places beyond the core, `[3 R]`.
     pub fn around(&self, t: &[f32], out: &mut [f32]) {
         out.fill(0.0);

@@ -145,7 +145,7 @@ impl LocalSolver {
         room.field[..core].copy_from_slice(t);
         self.factor.solve(env.isa, t);
         self.factor
-            .take_off(env, near, preconditioner, room, (t, p))?;
+            .take_off(env, (near, preconditioner), room, (t, p))?;
         preconditioner.respond_on_modes(env, p, &mut self.solved)?;
         add(1.0, &self.solved, &mut self.d.c);
         add(1.0, t, &mut self.d.t);

@@ -290,24 +290,42 @@ impl Pairs {
 /// Scratch of a layout.
 #[derive(Debug, Default, HeldBytes)]
 pub(in crate::corrections) struct Room {
-    /// Coordinates `[Q]`, of the near blocks alone.
+    /// Coordinates `[Q]`, of the near blocks alone, and those of three fields `[3,Q]`.
     pub q: Vec<f32>,
-    /// A field by place, and one at the free nodes.
+    pub three: Vec<f32>,
+    /// A field by place, or three at the free nodes; and one at those, or what three have of the modes.
     pub field: Vec<f32>,
     pub linear: Vec<f32>,
-    /// Those of the near blocks in which `q` is not all zero.
+    /// Those of the near blocks in which some coordinates are not all zero.
     pub used: Vec<Range<usize>>,
 }
 
 impl Room {
-    /// Finds the blocks in which the coordinates are not all zero.
-    pub fn find_used(&mut self, near: &NearSet) -> Result<()> {
+    /// `linear [n,r] = Phi^T field` of up to three fields `[n, 3 free]`.
+    pub fn on_modes(
+        &mut self,
+        env: Env<'_>,
+        (near, preconditioner): (&NearSet, &Preconditioner),
+        count: usize,
+    ) -> Result<()> {
+        let size = self.q.len();
+        if self.three.len() != 3 * size {
+            resize(&mut self.three, 3 * size)?;
+        }
+        let three = &mut self.three[..count * size];
+        let fields = self.field.chunks_exact((3 * near.free).max(1));
+        for (field, q) in fields.zip(three.chunks_exact_mut(size)) {
+            near.project(env, field, q);
+        }
         self.used.clear();
         memory::fit(&mut self.used, near.ranges.len(), WHAT)?;
-        let q = &self.q;
-        let is_used = |range: &&Range<usize>| q[(*range).clone()].iter().any(|q| *q != 0.0);
+        let is_used = |range: &&Range<usize>| {
+            let mut all = three.chunks_exact(size);
+            all.any(|q| q[(*range).clone()].iter().any(|q| *q != 0.0))
+        };
         self.used
             .extend(near.ranges.iter().filter(is_used).cloned());
+        preconditioner.on_modes_in(env, &self.used, three, &mut self.linear);
         Ok(())
     }
 }

@@ -70,7 +70,7 @@ impl Preconditioner {
         Ok(row_dots(env.isa, env.pool, modes, rows, q, out)?)
     }
 
-    /// The same of coordinates that are zero outside of some ranges.
+    /// The same of `n` lists of coordinates `[n,Q]` that are zero outside of some ranges, to `out [n,r]`.
     pub fn on_modes_in(&self, env: Env<'_>, ranges: &[Range<usize>], q: &[f32], out: &mut [f32]) {
         let (modes, rows) = (env.space.modes(), env.space.rows());
         row_dots_in(env.isa, modes, rows, ranges, q, out);

@@ -8,12 +8,14 @@
 
 mod dissection;
 mod front;
+mod many;
 
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 use lanes::Isa;
 
 use front::{eliminate, solve_back, solve_forward};
+use many::ManySides;
 
 /// What there is no memory for, where there is none.
 const WHAT: &str = "a sparse factor";
@@ -64,6 +66,7 @@ pub struct SparseFactor {
     /// Entries of a front's nodes, and a permuted right side.
     gathered: Vec<f32>,
     permuted: Vec<f32>,
+    many: ManySides,
     is_made: bool,
 }
 
@@ -127,7 +130,8 @@ impl SparseFactor {
         memory::fit(&mut self.gathered, widest, WHAT)?;
         self.gathered.resize(widest, 0.0);
         self.permuted.clear();
-        memory::fit(&mut self.permuted, 3 * count, WHAT)
+        memory::fit(&mut self.permuted, 3 * count, WHAT)?;
+        self.many.fit(3 * count, widest)
     }
 
     /// The border of each front: what its own nodes and its children's borders are coupled with.

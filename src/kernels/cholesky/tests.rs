@@ -76,6 +76,37 @@ fn it_solves_what_it_has_factored() {
     }
 }
 
+/// Several right sides give what each gives alone, up to rounding, and the same bits whatever the others are.
+#[test]
+fn right_sides_go_through_together() {
+    let (matrix, points) = lattice();
+    let size = 3 * matrix.rows();
+    let mut random = Random::new(5);
+    let mut sides = vec![0.0; 21 * size];
+    for (at, side) in sides.chunks_exact_mut(size).enumerate() {
+        match at % 3 {
+            0 => side[7 * at] = 1.0,
+            _ => side.copy_from_slice(&random.normal(size, 1.0)),
+        }
+    }
+    for isa in Isa::available() {
+        let mut factor = SparseFactor::default();
+        factor.plan(&matrix, &points).unwrap();
+        assert!(factor.factor(isa, &matrix).unwrap());
+        let mut solved = sides.clone();
+        factor.solve_many(isa, &mut solved);
+        for (solved, side) in solved.chunks_exact(size).zip(sides.chunks_exact(size)) {
+            let (mut alone, mut one) = (side.to_vec(), side.to_vec());
+            factor.solve_many(isa, &mut alone);
+            assert!(alone == solved, "{isa:?}: others change a right side");
+            factor.solve(isa, &mut one);
+            for (one, solved) in one.iter().zip(solved) {
+                assert!((one - solved).abs() < 1e-5, "{isa:?}: {solved} for {one}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_matrix_that_is_not_positive_has_no_factor() {
     let (mut matrix, points) = lattice();
