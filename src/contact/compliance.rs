@@ -101,6 +101,10 @@ pub struct Delassus {
     known: Vec<(u32, u32)>,
     /// By sample: its places among the columns.
     entries: Vec<Entries>,
+    /// `B A` of one sample `[3,3m]`.
+    line: Vec<f32>,
+    /// The rows by their samples' numbers.
+    order: Vec<u32>,
     /// Of which ties.
     ties: u64,
 }
@@ -184,26 +188,13 @@ impl Delassus {
             }
             self.entries.push(entries);
         }
-        let size_before = 3 * self.of_before.len();
-        for i in 0..count {
-            let was_i = self.was(i);
-            for j in i..count {
-                let was_j = self.was(j);
-                let block = match was_i != NONE && was_j != NONE {
-                    true => {
-                        let from = 3 * was_i as usize * size_before + 3 * was_j as usize;
-                        std::array::from_fn(|at| {
-                            self.w_before[from + (at / 3) * size_before + at % 3]
-                        })
-                    }
-                    false => self.block(i, j),
-                };
-                for (at, &value) in block.iter().enumerate() {
-                    let (r, c) = (3 * i + at / 3, 3 * j + at % 3);
-                    self.w[r * 3 * count + c] = value;
-                    self.w[c * 3 * count + r] = value;
-                }
-            }
+        self.order.clear();
+        memory::fit(&mut self.order, count, WHAT)?;
+        self.order.extend(0..count as u32);
+        self.order.sort_unstable_by_key(|at| rows[*at as usize]);
+        memory::fit(&mut self.line, 9 * self.columns.len(), WHAT)?;
+        for first in 0..count {
+            self.fill_rows(first);
         }
         Ok(true)
     }
@@ -217,29 +208,55 @@ impl Delassus {
         }
     }
 
-    /// The block of two samples, summed from the lower one of them: the same from both sides.
-    fn block(&self, i: usize, j: usize) -> [f32; 9] {
+    /// Blocks of `W` of the sample at `first` in the order of their numbers with itself and those after it: each is summed from the lower one of
+    /// two samples, so that it does not depend on the order of the rows.
+    fn fill_rows(&mut self, first: usize) {
+        let count = self.of.len();
+        let size_before = 3 * self.of_before.len();
+        let i = self.order[first] as usize;
+        let was_i = self.was(i);
+        self.line.clear();
+        for at in first..count {
+            let j = self.order[at] as usize;
+            let was_j = self.was(j);
+            let block: [f32; 9] = match was_i != NONE && was_j != NONE {
+                true => {
+                    let from = 3 * was_i as usize * size_before + 3 * was_j as usize;
+                    std::array::from_fn(|at| self.w_before[from + (at / 3) * size_before + at % 3])
+                }
+                false => self.block(i, j),
+            };
+            for (at, &value) in block.iter().enumerate() {
+                let (r, c) = (3 * i + at / 3, 3 * j + at % 3);
+                self.w[r * 3 * count + c] = value;
+                self.w[c * 3 * count + r] = value;
+            }
+        }
+    }
+
+    /// The block of the sample at `i`, whose `line` is made where it is not, with that at `j`.
+    fn block(&mut self, i: usize, j: usize) -> [f32; 9] {
         let order = 3 * self.columns.len();
-        let turned = self.of[i] > self.of[j];
-        let (row, other) = match turned {
-            true => (self.entries[j], self.entries[i]),
-            false => (self.entries[i], self.entries[j]),
-        };
-        let mut block = [0.0f32; 9];
-        for (from, x) in &row.places[..row.count] {
-            for (to, y) in &other.places[..other.count] {
-                for axis in 0..3 {
-                    let line = &self.a[(*from as usize + axis) * order + *to as usize..][..3];
-                    for (sum, value) in block[3 * axis..].iter_mut().zip(line) {
-                        *sum += x * y * value;
-                    }
+        let (row, other) = (self.entries[i], self.entries[j]);
+        if self.line.is_empty() {
+            self.line.resize(3 * order, 0.0);
+            for (from, x) in &row.places[..row.count] {
+                let lines = &self.a[*from as usize * order..][..3 * order];
+                for (sum, value) in self.line.iter_mut().zip(lines) {
+                    *sum += x * value;
                 }
             }
         }
-        match turned {
-            true => std::array::from_fn(|at| block[3 * (at % 3) + at / 3]),
-            false => block,
+        let mut block = [0.0f32; 9];
+        for (to, y) in &other.places[..other.count] {
+            for axis in 0..3 {
+                let values = &self.line[axis * order + *to as usize..][..3];
+                for (sum, value) in block[3 * axis..].iter_mut().zip(values) {
+                    *sum += y * value;
+                }
+            }
         }
+        block
     }
 
     /// Reads the columns that samples need, unless they are there; `wanted` has room for six a row.

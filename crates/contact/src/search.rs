@@ -14,6 +14,9 @@ use std::collections::TryReserveError;
 /// How far from a tool samples are looked at, in addition to its motion, mm.
 pub const SKIN_MM: f32 = 1.0;
 
+/// What distances may be off by, mm.
+const ROUNDING_MM: f32 = 0.01;
+
 /// A tool where it is, and how far from it to look: [`SKIN_MM`] and its motion ([`Body::motion`]).
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
@@ -88,7 +91,7 @@ impl Search {
             self.beyond.extend(samples.nodes().iter().map(sides));
             for face in 0..samples.face_count() {
                 let [a, b, c] = samples.corners(face).map(|n| self.beyond[n as usize]);
-                if a & b & c != 0 {
+                if a & b & c != 0 || is_far(samples, face, tool, &position) {
                     continue;
                 }
                 let nearest = nearest_of_face(samples, face, tool, &position);
@@ -125,6 +128,17 @@ fn candidate(tool: usize, sample: u32, point: Vector, nearest: Nearest) -> Candi
         distance: nearest.distance,
         normal: nearest.normal,
     }
+}
+
+/// Whether no point of a face is within a tool's skin: distance changes by no more than the way.
+fn is_far(samples: &Samples, face: usize, tool: &Placed, position: impl Fn(u32) -> Vector) -> bool {
+    let corners = samples.corners(face);
+    let corners = corners.map(|place| position(samples.nodes()[place as usize]));
+    let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+    let farthest = corners.map(|corner| corner.distance(middle));
+    let farthest = farthest.into_iter().fold(ROUNDING_MM, f32::max);
+    let distance = tool.body.nearest_at(&tool.pose, middle).distance;
+    distance > tool.skin + farthest + ROUNDING_MM
 }
 
 /// The point of a face's lattice that is nearest to a tool, or deepest in it, and where it is; none beyond the tool's skin, or where
