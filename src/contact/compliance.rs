@@ -97,8 +97,9 @@ pub struct Delassus {
     /// `W` and its samples in the call before.
     w_before: Vec<f32>,
     of_before: Vec<u32>,
-    /// Samples of the call before, ascending, and their rows there.
+    /// Samples of the call before, ascending, and their rows there; by sample, its row there or [`NONE`].
     known: Vec<(u32, u32)>,
+    was: Vec<u32>,
     /// By sample: its places among the columns.
     entries: Vec<Entries>,
     /// `B A` of one sample `[3,3m]`.
@@ -173,6 +174,9 @@ impl Delassus {
         memory::fit(&mut self.entries, count, WHAT)?;
         memory::fit(&mut self.of, count, WHAT)?;
         memory::fit(&mut self.w, 9 * count * count, WHAT)?;
+        memory::fit(&mut self.order, count, WHAT)?;
+        memory::fit(&mut self.was, count, WHAT)?;
+        memory::fit(&mut self.line, 9 * self.columns.len(), WHAT)?;
         let before = self.of_before.iter().enumerate();
         self.known
             .extend(before.map(|(at, &sample)| (sample, at as u32)));
@@ -189,53 +193,55 @@ impl Delassus {
             self.entries.push(entries);
         }
         self.order.clear();
-        memory::fit(&mut self.order, count, WHAT)?;
         self.order.extend(0..count as u32);
         self.order.sort_unstable_by_key(|at| rows[*at as usize]);
-        memory::fit(&mut self.line, 9 * self.columns.len(), WHAT)?;
+        self.was.clear();
+        let known = &self.known;
+        self.was.extend(rows.iter().map(|sample| {
+            let found = known.binary_search_by_key(sample, |known| known.0);
+            found.map_or(NONE, |found| known[found].1)
+        }));
         for first in 0..count {
             self.fill_rows(first);
         }
         Ok(true)
     }
 
-    /// The row that a sample had in the call before.
-    fn was(&self, at: usize) -> u32 {
-        let sample = self.of[at];
-        match self.known.binary_search_by_key(&sample, |known| known.0) {
-            Ok(found) => self.known[found].1,
-            Err(_) => NONE,
-        }
-    }
-
     /// Blocks of `W` of the sample at `first` in the order of their numbers with itself and those after it: each is summed from the lower one of
     /// two samples, so that it does not depend on the order of the rows.
     fn fill_rows(&mut self, first: usize) {
         let count = self.of.len();
-        let size_before = 3 * self.of_before.len();
+        let (size, size_before) = (3 * count, 3 * self.of_before.len());
         let i = self.order[first] as usize;
-        let was_i = self.was(i);
+        let was_i = self.was[i] as usize;
         self.line.clear();
         for at in first..count {
             let j = self.order[at] as usize;
-            let was_j = self.was(j);
-            let block: [f32; 9] = match was_i != NONE && was_j != NONE {
-                true => {
-                    let from = 3 * was_i as usize * size_before + 3 * was_j as usize;
-                    std::array::from_fn(|at| self.w_before[from + (at / 3) * size_before + at % 3])
+            let was_j = self.was[j] as usize;
+            let mut block = [[0.0f32; 3]; 3];
+            if self.was[i] != NONE && self.was[j] != NONE {
+                for (axis, row) in block.iter_mut().enumerate() {
+                    let from = (3 * was_i + axis) * size_before + 3 * was_j;
+                    row.copy_from_slice(&self.w_before[from..from + 3]);
                 }
-                false => self.block(i, j),
-            };
-            for (at, &value) in block.iter().enumerate() {
-                let (r, c) = (3 * i + at / 3, 3 * j + at % 3);
-                self.w[r * 3 * count + c] = value;
-                self.w[c * 3 * count + r] = value;
+            } else {
+                self.add_block(i, j, &mut block);
+            }
+            if i == j {
+                block[0] = [block[0][0], block[1][0], block[2][0]];
+                block[1][2] = block[2][1];
+            }
+            for axis in 0..3 {
+                let row = &mut self.w[(3 * i + axis) * size + 3 * j..][..3];
+                row.copy_from_slice(&block[axis]);
+                let turned = [block[0][axis], block[1][axis], block[2][axis]];
+                self.w[(3 * j + axis) * size + 3 * i..][..3].copy_from_slice(&turned);
             }
         }
     }
 
-    /// The block of the sample at `i`, whose `line` is made where it is not, with that at `j`.
-    fn block(&mut self, i: usize, j: usize) -> [f32; 9] {
+    /// Adds the block of the sample at `i`, whose `line` is made where it is not, with that at `j`.
+    fn add_block(&mut self, i: usize, j: usize, block: &mut [[f32; 3]; 3]) {
         let order = 3 * self.columns.len();
         let (row, other) = (self.entries[i], self.entries[j]);
         if self.line.is_empty() {
@@ -247,16 +253,14 @@ impl Delassus {
                 }
             }
         }
-        let mut block = [0.0f32; 9];
         for (to, y) in &other.places[..other.count] {
-            for axis in 0..3 {
+            for (axis, row) in block.iter_mut().enumerate() {
                 let values = &self.line[axis * order + *to as usize..][..3];
-                for (sum, value) in block[3 * axis..].iter_mut().zip(values) {
+                for (sum, value) in row.iter_mut().zip(values) {
                     *sum += y * value;
                 }
             }
         }
-        block
     }
 
     /// Reads the columns that samples need, unless they are there; `wanted` has room for six a row.

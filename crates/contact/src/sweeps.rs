@@ -187,8 +187,10 @@ impl Sweeps {
     }
 
     /// How the last solve's change of force moves each contact's sample, mm: `W (f' - f)`.
+    #[inline]
     pub fn shift(&self, contact: usize) -> Vector {
-        Vector::from_slice(&self.shift[3 * contact..])
+        let at = 3 * contact;
+        Vector::new(self.shift[at], self.shift[at + 1], self.shift[at + 2])
     }
 
     fn sweep(
@@ -199,14 +201,15 @@ impl Sweeps {
     ) -> f32 {
         let mut largest = 0.0f32;
         for (i, contact) in contacts.iter().enumerate() {
-            let gap = contact.gap + contact.normal.dot(self.shift(i));
+            let shift = self.shift(i);
+            let gap = contact.gap + contact.normal.dot(shift);
             let touch = matches!(contact.law, Law::Touch { .. });
             if touch && gap >= 0.0 && forces[i] == Vector::ZERO {
                 continue;
             }
             let made = &mut self.blocks[i];
             let block = made.get_or_insert_with(|| Block::new(delassus.rows(i), i, contact));
-            let now = contact.slip + Vector::from_slice(&self.shift[3 * i..]);
+            let now = contact.slip + shift;
             let local = block.frame.transpose() * forces[i];
             let wanted = match contact.law {
                 Law::Tie(pull) => {
