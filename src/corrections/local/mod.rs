@@ -271,6 +271,10 @@ impl LocalSolver {
 
     /// The level that the next step begins with, `u` being the state of this one.
     pub(super) fn next_level(&self, u: &[f32]) -> usize {
+        if self.touched.is_empty() {
+            // What moves then is not what a tool pushes.
+            return self.level;
+        }
         let u = u.as_chunks::<3>().0;
         let squares = self.touched.iter().map(|&node| u[node as usize]);
         let squares = squares.map(|u| u.iter().map(|u| u * u).sum::<f32>());

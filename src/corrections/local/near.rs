@@ -21,8 +21,8 @@ const REACH_EDGES: f32 = 3.0;
 /// Levels of the reach, and what multiplies it in each.
 pub(in crate::corrections) const LEVELS: usize = 4;
 const WIDER: [f32; LEVELS] = [1.0, 1.5, 2.25, f32::INFINITY];
-/// A set is too narrow where the far nodes are smoothed by more than this part of how far the touched ones have been pushed.
-const FAR_PART: f32 = 6e-5;
+/// A set is too narrow where the far nodes are smoothed by more than this part of how far the touched ones have been pushed, or of a millimetre.
+const FAR_PART: f32 = 1e-4;
 /// A level beyond the first is not taken with more nodes than these, but the widest below it that has fewer.
 const MOST_NODES: usize = 4500;
 /// Where a larger part of the nodes would be near, all are, and so they are in a body of fewer nodes: whole, it costs no more than its modes do.
@@ -358,7 +358,7 @@ impl NearSet {
 /// been pushed by `pushed_mm`. It is not narrower until the tools have left: under a tool that is held still the far nodes come to balance
 /// also in a set that is too narrow for the next motion.
 pub(in crate::corrections) fn next_level(level: usize, far_mm: f32, pushed_mm: f32) -> usize {
-    match far_mm > FAR_PART * pushed_mm {
+    match far_mm > FAR_PART * pushed_mm.max(1.0) {
         true => (level + 1).min(LEVELS - 1),
         false => level,
     }
