@@ -231,10 +231,9 @@ impl Delassus {
                 block[0] = [block[0][0], block[1][0], block[2][0]];
                 block[1][2] = block[2][1];
             }
-            for axis in 0..3 {
-                let row = &mut self.w[(3 * i + axis) * size + 3 * j..][..3];
-                row.copy_from_slice(&block[axis]);
-                let turned = [block[0][axis], block[1][axis], block[2][axis]];
+            for (axis, values) in block.iter().enumerate() {
+                self.w[(3 * i + axis) * size + 3 * j..][..3].copy_from_slice(values);
+                let turned = block.map(|row| row[axis]);
                 self.w[(3 * j + axis) * size + 3 * i..][..3].copy_from_slice(&turned);
             }
         }

@@ -2,7 +2,7 @@
 //!
 //! Work is counted and not timed, so that a step has the same bits on every machine; only a host's budget is a time.
 //!
-//! REQ-046: The work of the contact solves of a step is bounded for any poses of tools (twice that of a first guess where it is of no use), and what they left unsolved is told by a flag.
+//! REQ-046: The work of the contact solves of a step is bounded for any poses of tools (twice that where ties or loads act and the first guess is of no use), and what they left unsolved is told by a flag.
 
 use crate::clock::Instant;
 use crate::memory::HeldBytes;

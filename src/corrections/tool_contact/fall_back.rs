@@ -48,7 +48,9 @@ impl ImplicitSolver {
         // What a linear response turns inside out is no tissue: a tool that has lost the contact there pushes its way in from a sound state, in the steps that
         // follow.
         let found = at.det;
-        if found >= SMALLEST_DET {
+        let is_cut = !context.corrections.changed.is_empty();
+        let must_be_sound = is_cut || Self::must_be_sound(context, input, problem);
+        if found >= SMALLEST_DET || !must_be_sound {
             return Ok(());
         }
         if found_sound {

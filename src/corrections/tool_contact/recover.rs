@@ -15,8 +15,19 @@ const HALVES: u32 = 8;
 const BEGUN_DET: f32 = 0.2;
 
 impl ImplicitSolver {
+    /// Whether the step must not end inside out where another state is known. Tools alone may: they find tissue that is inside out, and lose it where it
+    /// stays as it was; ties and loads act on it for as long as they last.
+    pub(super) fn must_be_sound(
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        problem: &ContactProblem,
+    ) -> bool {
+        let is_moved = input.load.is_some() || !context.corrections.groups.is_empty();
+        is_moved || problem.has_ties()
+    }
+
     /// Iterates from the last state, or where that has inverted elements, too, from a part of the way from rest to the guess; returns the length of what is left
-    /// unbalanced near the tools.
+    /// unbalanced near the tools. With tools alone a last state with inverted elements, or work that is spent, leaves the guess.
     pub(super) fn recover(
         &mut self,
         context: SolverContext<'_>,
@@ -25,8 +36,13 @@ impl ImplicitSolver {
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<f64> {
-        problem.work.renew();
-        if self.motion.min_det >= SMALLEST_DET && !input.still {
+        let was_sound = self.motion.min_det >= SMALLEST_DET && !input.still;
+        if Self::must_be_sound(context, input, problem) {
+            problem.work.renew();
+        } else if !was_sound || problem.work.is_spent() {
+            return Ok(f64::INFINITY);
+        }
+        if was_sound {
             self.stay(context, input, problem, at, report)?;
             if !context.corrections.groups.is_empty() {
                 self.lift(context, input, Some(input.last), at.u)?;

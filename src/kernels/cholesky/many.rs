@@ -1,120 +1,43 @@
-//! Several right sides at once: the factor is read once for [`SIDES`] of them.
+//! Kernels of a front for [`SIDES`] right sides at once, and the room for these.
 
-use lanes::{DenseLanes, Isa, by_isa};
+use lanes::{DenseLanes, by_isa};
 
-use super::{SparseFactor, WHAT};
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
 /// Right sides that go through together.
-const SIDES: usize = 16;
+pub const SIDES: usize = 16;
 /// Rows of `U` that go through together.
 const PANEL: usize = 8;
 
 /// One value of each right side.
-type Sides = [f32; SIDES];
+pub type Sides = [f32; SIDES];
 
 /// Room for the right sides: permuted, and those of one front.
 #[derive(Default, HeldBytes)]
-pub(super) struct ManySides {
-    permuted: Vec<Sides>,
-    gathered: Vec<Sides>,
+pub struct ManySides {
+    pub permuted: Vec<Sides>,
+    pub gathered: Vec<Sides>,
 }
 
 impl ManySides {
-    pub fn fit(&mut self, rows: usize, widest: usize) -> Result<()> {
+    pub fn fit(&mut self, rows: usize, widest: usize, what: &str) -> Result<()> {
         for (list, count) in [(&mut self.permuted, rows), (&mut self.gathered, widest)] {
             list.clear();
-            memory::fit(list, count, WHAT)?;
+            memory::fit(list, count, what)?;
             list.resize(count, [0.0; SIDES]);
         }
         Ok(())
     }
 }
 
-impl SparseFactor {
-    /// `x = A^-1 b` in place for right sides that follow each other, each `[3 rows]`. What one of them gives does not depend on the others.
-    ///
-    /// # Panics
-    /// If there is no factor or the length is no multiple of that of a right side.
-    pub fn solve_many(&mut self, isa: Isa, x: &mut [f32]) {
-        assert!(self.is_made, "there is no factor");
-        let len = 3 * self.order.len();
-        assert!(
-            len == 0 || x.len().is_multiple_of(len),
-            "length of the right sides"
-        );
-        for sides in x.chunks_mut((SIDES * len).max(1)) {
-            self.solve_sides(isa, sides, len);
-        }
-    }
-
-    fn solve_sides(&mut self, isa: Isa, x: &mut [f32], len: usize) {
-        let count = x.len() / len;
-        let ManySides { permuted, gathered } = &mut self.many;
-        permuted.fill([0.0; SIDES]);
-        for (side, x) in x.chunks_exact(len).enumerate() {
-            for (node, values) in x.as_chunks::<3>().0.iter().enumerate() {
-                if *values != [0.0; 3] {
-                    let place = 3 * self.places[node] as usize;
-                    for (axis, value) in values.iter().enumerate() {
-                        permuted[place + axis][side] = *value;
-                    }
-                }
-            }
-        }
-        let borders = self.borders.as_slice();
-        for front in &self.fronts {
-            let own = &permuted[3 * front.first as usize..][..3 * front.own as usize];
-            if own.iter().all(|values| *values == [0.0; SIDES]) {
-                continue;
-            }
-            let width = front.gather_from(borders, permuted, gathered);
-            let own = 3 * front.own as usize;
-            let upper = &self.upper[front.upper..][..own * width];
-            forward(isa, upper, width, count, &mut gathered[..width]);
-            permuted[3 * front.first as usize..][..own].copy_from_slice(&gathered[..own]);
-            let border = gathered[own..].as_chunks::<3>().0;
-            for (from, &place) in border.iter().zip(front.border_in(borders)) {
-                permuted[3 * place as usize..][..3].copy_from_slice(from);
-            }
-        }
-        for front in self.fronts.iter().rev().filter(|front| front.own > 0) {
-            let width = front.gather_from(borders, permuted, gathered);
-            let own = 3 * front.own as usize;
-            let upper = &self.upper[front.upper..][..own * width];
-            back(isa, upper, width, count, &mut gathered[..width]);
-            permuted[3 * front.first as usize..][..own].copy_from_slice(&gathered[..own]);
-        }
-        for (side, x) in x.chunks_exact_mut(len).enumerate() {
-            for (values, &place) in x.as_chunks_mut::<3>().0.iter_mut().zip(&self.places) {
-                let place = 3 * place as usize;
-                *values = [0, 1, 2].map(|axis| permuted[place + axis][side]);
-            }
-        }
-    }
-}
-
-impl super::Front {
-    /// Its nodes' entries of permuted right sides; gives how many they are.
-    fn gather_from(&self, borders: &[u32], from: &[Sides], to: &mut [Sides]) -> usize {
-        let own = 3 * self.own as usize;
-        to[..own].copy_from_slice(&from[3 * self.first as usize..][..own]);
-        let border = self.border_in(borders);
-        for (to, &place) in to[own..].as_chunks_mut::<3>().0.iter_mut().zip(border) {
-            to.copy_from_slice(&from[3 * place as usize..][..3]);
-        }
-        own + 3 * border.len()
-    }
-}
-
 by_isa! {
     /// `U11^T y1 = b1`, `b2 -= U12^T y1` with the rows `[own, width]` of `U`, of the first `count` right sides.
-    fn forward(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) = forward_body, forward_scalar;
+    pub fn forward(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) = forward_body, forward_scalar;
 }
 by_isa! {
     /// `U11 x1 = y1 - U12 x2` likewise.
-    fn back(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) = back_body, back_scalar;
+    pub fn back(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) = back_body, back_scalar;
 }
 
 fn forward_scalar(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) {

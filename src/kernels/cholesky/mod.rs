@@ -9,6 +9,7 @@
 mod dissection;
 mod front;
 mod many;
+mod sides;
 
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
@@ -131,7 +132,7 @@ impl SparseFactor {
         self.gathered.resize(widest, 0.0);
         self.permuted.clear();
         memory::fit(&mut self.permuted, 3 * count, WHAT)?;
-        self.many.fit(3 * count, widest)
+        self.many.fit(3 * count, widest, WHAT)
     }
 
     /// The border of each front: what its own nodes and its children's borders are coupled with.
