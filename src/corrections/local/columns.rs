@@ -103,7 +103,7 @@ impl NearColumns {
         columns: &[u32],
     ) -> Result<()> {
         let (env, near) = (by.env, by.near);
-        let (size, modes) = (3 * near.core, env.space.count());
+        let (size, modes) = (3 * near.core, env.space.count().max(1));
         // What an error has left half made is made anew.
         let known = self.columns.len();
         self.moved.truncate(3 * known * size);
@@ -126,7 +126,8 @@ impl NearColumns {
             let place = near.place(env.prior.contact_nodes[column as usize]);
             place.filter(|place| *place < near.core)
         };
-        self.made.sort_by_key(|column| core(*column).is_none());
+        self.made
+            .sort_unstable_by_key(|column| (core(*column).is_none(), *column));
         let in_core = self.made.iter().filter(|c| core(**c).is_some()).count();
         let moved = &mut self.moved[3 * known * size..][..3 * in_core * size];
         for (at, &column) in self.made[..in_core].iter().enumerate() {
