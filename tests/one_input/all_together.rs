@@ -2,13 +2,15 @@
 //!
 //! 160 steps; 10,000 with `UPT_NIGHTLY=1`. `UPT_FUZZ_SEED` is where their numbers begin. The counts are printed.
 
+use std::path::Path;
+
 use upt::contact::Tool;
 use upt::{
-    Bed, Contact, Corrections, Loads, Pressure, Scene, SceneOptions, Shape, Spring, StepInput,
-    SupportPose, Tie, TieEnd, TiePoint, Vector,
+    Bed, Contact, Corrections, Loads, Model, ModelOptions, Pressure, Scene, SceneOptions, Shape,
+    Spring, StepInput, SupportPose, Tie, TieEnd, TiePoint, Vector,
 };
 
-use crate::fixture;
+use crate::fixture::find_runtime;
 use crate::ties::place;
 
 /// Steps after which other ties take the place of those that there are, and the ball leaps.
@@ -101,7 +103,9 @@ fn random_loads_together_invert_no_element() {
         0 => 160,
         _ => 10_000,
     };
-    let model = fixture::model("brain-coarse-reduced");
+    find_runtime();
+    let path = Path::new("onnx/brain-coarse-reduced");
+    let model = Model::open(path, &ModelOptions::default()).unwrap();
     let options = SceneOptions {
         corrections: Corrections::Fixed(10),
         ..SceneOptions::default()
