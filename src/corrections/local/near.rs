@@ -22,7 +22,7 @@ const REACH_EDGES: f32 = 3.0;
 pub(in crate::corrections) const LEVELS: usize = 4;
 const WIDER: [f32; LEVELS] = [1.0, 1.5, 2.25, f32::INFINITY];
 /// A set is too narrow where the far nodes are smoothed by more than this part of how far the touched ones have been pushed, or of a millimetre.
-const FAR_PART: f32 = 1e-4;
+const FAR_PART: f32 = 8e-5;
 /// A level beyond the first is not taken with more nodes than these, but the widest below it that has fewer.
 const MOST_NODES: usize = 4500;
 /// Where a larger part of the nodes would be near, all are, and so they are in a body of fewer nodes: whole, it costs no more than its modes do.
