@@ -32,7 +32,7 @@ def sources(package: Path, others: list[Path]) -> str:
 def main() -> int:
     """Checks all packages of the workspace."""
     root = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))
-    packages = [(ROOT / member).resolve() for member in root["workspace"]["members"]]
+    packages = [(ROOT / member).resolve() for member in (".", *root["workspace"]["members"])]
     left = set(root["workspace"]["dependencies"])
     faults = []
     for package in packages:

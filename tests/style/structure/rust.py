@@ -151,4 +151,4 @@ class Crate:
 def crates() -> list[Crate]:
     """All crates of the workspace."""
     members = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))["workspace"]["members"]
-    return [Crate(ROOT / member / "src") for member in members]
+    return [Crate(ROOT / member / "src") for member in (".", *members)]
