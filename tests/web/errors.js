@@ -17,6 +17,11 @@
   list.push(`${points.length} of ${displacement.length === tissue.positions.length}`);
   list.push(await said(() => tissue.frame([{ ...far, position: [NaN, 0, 0] }])));
   list.push(`${(await tissue.frame([far])).displacement.length > 0}`);
+  // The steps that are due by then lie between poses from before and after the refused one.
+  await new Promise((resolve) => setTimeout(resolve, 100));
+  await tissue.frame([far]);
+  await new Promise((resolve) => setTimeout(resolve, 100));
+  list.push(await said(() => tissue.frame([far])));
   tissue.close();
   list.push(await said(() => tissue.frame()));
   return list;

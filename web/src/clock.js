@@ -15,18 +15,22 @@ export class Clock {
     this.#dt = dt;
   }
 
+  /** The first step is due at `now`, s, unless there were others. */
+  start(now) {
+    if (this.#started) return;
+    this.#started = true;
+    this.#next = this.#published = now;
+  }
+
   /** The instruments are here at `now`, s. */
   moved(now, instruments) {
-    if (!this.#started) {
-      this.#started = true;
-      this.#next = this.#published = now;
-    }
+    this.start(now);
     if (this.#poses.length === MOST_POSES) this.#poses.shift();
     this.#poses.push([now, instruments]);
   }
 
   due(now) {
-    return this.#started && now + 1e-9 >= this.#next;
+    return this.#poses.length > 0 && now + 1e-9 >= this.#next;
   }
 
   /** A step is made: the instruments at its moment. */

@@ -58,10 +58,12 @@ const answers = {
       const at = (step) => recorded[step] ?? [];
       shown = between(at(Math.max(replayed - 1, 0)), at(replayed), clock.part(framed));
     }
-    clock.moved(framed, shown);
+    clock.start(framed);
     const displacement = scene.present(clock.since(framed), shown).slice();
     const points = attached ? scene.present(clock.since(framed), shown, { points: true }).slice() : undefined;
     const frameMs = performance.now() - begun;
+    // Steps lie between poses that the library has taken: one that it refused would be in the way of those to come.
+    clock.moved(framed, shown);
     clearTimeout(timer);
     timer = setTimeout(stepOn);
     return { displacement, points, instruments: shown, frameMs, recording: recording !== undefined, replaying: replayed !== undefined, ...last };
