@@ -103,7 +103,7 @@ impl NearColumns {
         columns: &[u32],
     ) -> Result<()> {
         let (env, near) = (by.env, by.near);
-        let (size, modes) = (3 * near.core, env.space.count().max(1));
+        let (size, modes) = (3 * near.core, env.space.count());
         // What an error has left half made is made anew.
         let known = self.columns.len();
         self.moved.truncate(3 * known * size);
@@ -177,7 +177,7 @@ impl NearFactor {
         (t, p): (&[f32], &mut [f32]),
     ) -> Result<()> {
         let (free, modes) = (3 * level.0.free, env.space.count());
-        let count = p.len() / modes.max(1);
+        let count = p.len() / modes;
         let core = t.len() / count.max(1);
         for n in 0..count {
             let field = &mut room.field[n * free..][..free];

@@ -306,8 +306,8 @@ impl SparseFactor {
 }
 
 impl Front {
-    /// Its nodes' entries of a permuted field; gives how many they are.
-    fn gather(&self, borders: &[u32], from: &[f32], to: &mut [f32]) -> usize {
+    /// Its nodes' entries of a permuted field, or of several; gives how many they are.
+    fn gather<T: Copy>(&self, borders: &[u32], from: &[T], to: &mut [T]) -> usize {
         let own = 3 * self.own as usize;
         to[..own].copy_from_slice(&from[3 * self.first as usize..][..own]);
         let border = self.border_in(borders);
@@ -324,13 +324,13 @@ impl Front {
     }
 
     /// Puts its own back.
-    fn scatter(&self, from: &[f32], to: &mut [f32]) {
+    fn scatter<T: Copy>(&self, from: &[T], to: &mut [T]) {
         let own = 3 * self.own as usize;
         to[3 * self.first as usize..][..own].copy_from_slice(&from[..own]);
     }
 
     /// Puts those of its border back.
-    fn scatter_border(&self, borders: &[u32], from: &[f32], to: &mut [f32]) {
+    fn scatter_border<T: Copy>(&self, borders: &[u32], from: &[T], to: &mut [T]) {
         let from = from[3 * self.own as usize..].as_chunks::<3>().0;
         for (from, &place) in from.iter().zip(self.border_in(borders)) {
             to[3 * place as usize..][..3].copy_from_slice(from);

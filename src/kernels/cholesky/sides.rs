@@ -2,8 +2,8 @@
 
 use lanes::Isa;
 
-use super::many::{ManySides, SIDES, Sides, back, forward};
-use super::{Front, SparseFactor};
+use super::SparseFactor;
+use super::many::{ManySides, SIDES, back, forward};
 
 impl SparseFactor {
     /// `x = A^-1 b` in place for right sides that follow each other, each `[3 rows]`. What one of them gives does not depend on the others.
@@ -42,22 +42,17 @@ impl SparseFactor {
             if own.iter().all(|values| *values == [0.0; SIDES]) {
                 continue;
             }
-            let width = front.gather_from(borders, permuted, gathered);
-            let own = 3 * front.own as usize;
-            let upper = &self.upper[front.upper..][..own * width];
+            let width = front.gather(borders, permuted, gathered);
+            let upper = &self.upper[front.upper..][..3 * front.own as usize * width];
             forward(isa, upper, width, count, &mut gathered[..width]);
-            permuted[3 * front.first as usize..][..own].copy_from_slice(&gathered[..own]);
-            let border = gathered[own..].as_chunks::<3>().0;
-            for (from, &place) in border.iter().zip(front.border_in(borders)) {
-                permuted[3 * place as usize..][..3].copy_from_slice(from);
-            }
+            front.scatter(gathered, permuted);
+            front.scatter_border(borders, gathered, permuted);
         }
         for front in self.fronts.iter().rev().filter(|front| front.own > 0) {
-            let width = front.gather_from(borders, permuted, gathered);
-            let own = 3 * front.own as usize;
-            let upper = &self.upper[front.upper..][..own * width];
+            let width = front.gather(borders, permuted, gathered);
+            let upper = &self.upper[front.upper..][..3 * front.own as usize * width];
             back(isa, upper, width, count, &mut gathered[..width]);
-            permuted[3 * front.first as usize..][..own].copy_from_slice(&gathered[..own]);
+            front.scatter(gathered, permuted);
         }
         for (side, x) in x.chunks_exact_mut(len).enumerate() {
             for (values, &place) in x.as_chunks_mut::<3>().0.iter_mut().zip(&self.places) {
@@ -65,18 +60,5 @@ impl SparseFactor {
                 *values = [0, 1, 2].map(|axis| permuted[place + axis][side]);
             }
         }
-    }
-}
-
-impl Front {
-    /// Its nodes' entries of permuted right sides; gives how many they are.
-    fn gather_from(&self, borders: &[u32], from: &[Sides], to: &mut [Sides]) -> usize {
-        let own = 3 * self.own as usize;
-        to[..own].copy_from_slice(&from[3 * self.first as usize..][..own]);
-        let border = self.border_in(borders);
-        for (to, &place) in to[own..].as_chunks_mut::<3>().0.iter_mut().zip(border) {
-            to.copy_from_slice(&from[3 * place as usize..][..3]);
-        }
-        own + 3 * border.len()
     }
 }
