@@ -106,7 +106,15 @@ def errors_are_told(browser: Browser, address: str) -> None:
     browser.open(address)
     browser.run(Path(__file__).with_name("errors.js").read_text(encoding="utf-8"))
     said = browser.wait("window.said")
-    wanted = ["404", "UPT_ERR_BUNDLE", "6 of true", "UPT_ERR_NON_FINITE", "true", "nothing", "UPT_ERR_HANDLE: the tissue"]
+    wanted = [
+        "404",
+        "UPT_ERR_BUNDLE",
+        "6 of true",
+        "UPT_ERR_NON_FINITE",
+        "true",
+        "nothing",
+        "UPT_ERR_HANDLE: the tissue",
+    ]
     assert len(said) == len(wanted) and all(word in one for one, word in zip(said, wanted, strict=True)), said
 
 
