@@ -2197,8 +2197,9 @@ upt_status upt_scene_surface_positions(struct upt_scene *scene,
  * that takes longer, but always within two steps.
  *
  * - `input`: what drives the tissue, where it is at `when`: instruments, or for scenes that nodes drive these nodes and where they are.
- *   Nodes of the last step that are no longer listed are released: they lose the force that held them. Neither `displacement` nor
- *   `time_s` may be set. NULL: nothing touches the tissue.
+ *   Nodes of the last step that are no longer listed are released: they lose the force that held them. `supports` says where support
+ *   groups are at `when`; without any, they go on as they went. A group is seen from the first step on that moves it. Other loads are
+ *   those of the step. Neither `displacement` nor `time_s` may be set. NULL: nothing touches the tissue.
  * - `when`: the moment on the clock of the steps' `time_s`, s, not before that of the last published step; for hosts whose steps have
  *   no time, the time since the last published step. Velocities are followed for two steps at most.
  * - `view`: the region or the attached points; NULL: the region.

@@ -8,8 +8,6 @@ use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the support groups of the corrections";
-/// One and three coordinates along three axes.
-const MOST_COLUMNS: usize = 12;
 
 /// A support group of the bundle.
 pub struct Group {
@@ -44,6 +42,9 @@ impl HeldBytes for GroupModes {
 }
 
 impl Group {
+    /// One and three coordinates along three axes.
+    pub const MOST_COLUMNS: usize = 12;
+
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn new(nodes: &[u32]) -> Result<Group> {
@@ -52,12 +53,31 @@ impl Group {
             lift: OnceLock::new(),
         })
     }
+
+    /// Whether its columns have been made: a step has moved it, in any scene of the model.
+    pub fn has_lift(&self) -> bool {
+        self.lift.get().is_some()
+    }
+
+    /// What of a change at its nodes each column has; zero where none has been made.
+    pub fn amounts(&self, change: impl Fn(usize) -> [f32; 3]) -> [f32; Group::MOST_COLUMNS] {
+        (self.lift.get()).map_or([0.0; Group::MOST_COLUMNS], |lift| lift.amounts(change))
+    }
+
+    /// Adds to a node what those amounts of the columns do there.
+    pub fn add(&self, amounts: &[f32], node: u32, u: &mut [f32; 3]) {
+        let columns = self.lift.get().map_or(&[][..], |lift| &lift.columns);
+        for (amount, column) in amounts.iter().zip(columns) {
+            let own = &column[3 * node as usize..][..3];
+            (u.iter_mut().zip(own)).for_each(|(u, w)| *u += amount * w);
+        }
+    }
 }
 
 impl Lift {
     /// What of a change of the group's displacement each column has.
-    pub(super) fn amounts(&self, change: impl Fn(usize) -> [f32; 3]) -> [f32; MOST_COLUMNS] {
-        let mut sums = [0.0f64; MOST_COLUMNS];
+    pub(super) fn amounts(&self, change: impl Fn(usize) -> [f32; 3]) -> [f32; Group::MOST_COLUMNS] {
+        let mut sums = [0.0f64; Group::MOST_COLUMNS];
         let count = self.functions[0].len();
         for at in 0..count {
             let change = change(at);

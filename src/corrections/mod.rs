@@ -52,6 +52,7 @@ use whole::WholeModes;
 pub use body::Body;
 pub use boundary::Held;
 pub use far::FarField;
+pub use group::Group;
 pub use history::{History, PAIRS};
 pub use input::{Enough, Input, Report, SolverContext};
 pub use load::{Load, LoadPoint};

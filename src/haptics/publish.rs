@@ -1,5 +1,7 @@
 //! The scene's end: after each published state the contact problem near the tool.
 
+mod motion;
+mod stepped;
 pub mod tissue;
 
 use std::sync::Arc;
@@ -8,18 +10,17 @@ use std::sync::atomic::Ordering;
 use ::contact::{Body, Placed, Pose, Sample, Samples, Search, Vector};
 use exchange::{Reader, Writer, exchange};
 
+pub use self::stepped::Stepped;
+
+use self::motion::{Carried, ModalRoom};
 use super::HapticOptions;
 use super::ends::Ends;
 use super::modes::Modes;
 use super::render::Haptics;
 use super::snapshot::{ContactSnapshot, MOST_SAMPLES};
-use crate::contact::{
-    Compliance, ContactProblem, Delassus, Mode, PUT_MM, Pair, State, outward, vector,
-};
-use crate::corrections::{Corrections, Integrator, Motion};
+use crate::contact::{Compliance, Delassus, Mode, PUT_MM, Pair, State, outward, vector};
+use crate::corrections::{Corrections, Integrator};
 use crate::error::{Error, Result};
-use crate::kernels::project::{project_field, row_dots};
-use crate::kernels::{Isa, Pool};
 use crate::memory::{self, HeldBytes};
 use crate::prior::PriorTable;
 
@@ -68,27 +69,13 @@ pub struct Link {
     /// Mass of the natural modes, g.
     masses: Vec<f32>,
     rows: Vec<u32>,
+    carried: Carried,
     /// How many states were published: the hand sees by it how many it missed.
     number: u64,
     /// Age of a state when the hand gets it, s; the time that the step took where the host gave none.
     latency_s: Option<f64>,
     /// Where the hand was when the last state was published.
     last_pose: Option<Pose>,
-}
-
-/// A published state.
-pub struct Stepped<'a> {
-    pub isa: Isa,
-    pub pool: &'a Pool,
-    pub prior: &'a PriorTable,
-    pub corrections: &'a Corrections,
-    pub motion: &'a Motion,
-    pub problem: Option<&'a ContactProblem>,
-    /// `[K,3]`, mm.
-    pub rest: &'a [f32],
-    pub u: &'a [f32],
-    /// Time that the step took, s.
-    pub took_s: f64,
 }
 
 /// Both ends for a tool on a body.
@@ -133,6 +120,7 @@ pub fn join(
         field: memory::zeros(3 * corrections.body.mass.len(), WHAT)?,
         masses: memory::collected(natural.len(), natural.iter().map(|mode| mode.1), WHAT)?,
         rows: memory::collected(natural.len(), 0..natural.len() as u32, WHAT)?,
+        carried: Carried::default(),
         number: 0,
         latency_s: options.latency_s,
         last_pose: None,
@@ -234,25 +222,16 @@ impl Link {
                 }
             }
         }
-        // Velocity and drive of each natural mode: `N^T M v / m` and `N^T f / m`.
-        let mut project = |field: &[f32], weighted: bool, out: &mut [f32]| -> Result<()> {
-            let mass = &step.corrections.body.mass;
-            for (i, (to, from)) in self.field.iter_mut().zip(field).enumerate() {
-                let mass = if weighted { mass[i / 3] } else { 1.0 };
-                *to = if held[i / 3] { 0.0 } else { mass * from };
-            }
-            let (isa, pool, q) = (step.isa, step.pool, &mut self.coordinates);
-            let basis = step.prior.basis();
-            project_field(isa, pool, &basis, &self.starts, &self.field, q)?;
-            let modes = step.corrections.space.modes();
-            row_dots(isa, pool, modes, &self.rows, q, out)?;
-            for (out, mass) in out.iter_mut().zip(&self.masses) {
-                *out /= mass;
-            }
-            Ok(())
+        let room = ModalRoom {
+            starts: &self.starts,
+            masses: &self.masses,
+            rows: &self.rows,
+            field: &mut self.field,
+            coordinates: &mut self.coordinates,
         };
-        project(&step.motion.velocity, true, &mut snapshot.velocity)?;
-        project(&step.motion.inertia, false, &mut snapshot.drive)?;
+        let out = [&mut *snapshot.velocity, &mut *snapshot.drive];
+        motion::modal(step, &mut self.carried, room, out)?;
+        snapshot.followed_s = motion::FOLLOWED_STEPS * step.integrator.step_s;
         let state = State {
             rest: step.rest,
             u: step.u,
@@ -276,6 +255,9 @@ impl Link {
                 found.map_or(Vector::ZERO, |place| past.forces[place].force)
             });
             snapshot.points[at] = point;
+            let groups = step.corrections.groups.as_slice();
+            let base = |node| Vector::from(self.carried.velocity(groups, node));
+            snapshot.carried[at] = sample.gather(base);
             snapshot.outward[at] = outward(&self.samples, row, state);
             snapshot.forces[at] = force;
             snapshot.anchors[at] = anchor;

@@ -126,7 +126,7 @@ impl Haptics {
             self.since_s += seconds;
         }
         if time > 0.0 {
-            self.contact.modes.advance(time, &snapshot.drive);
+            self.contact.advance(snapshot, time);
         }
         let least = if arrived { FIRST_S } else { LEAST_S };
         let part = self.contact.follow(snapshot, time.max(least) as f32);

@@ -23,6 +23,9 @@ pub struct ContactSnapshot {
     pub count: usize,
     /// Where they are, mm.
     pub points: Vec<Vector>,
+    /// How fast support groups carry them, mm/s, and how long that is followed after the step, s.
+    pub carried: Vec<Vector>,
+    pub followed_s: f64,
     /// The surface's normal there.
     pub outward: Vec<Vector>,
     /// Of the tool on the tissue, mN.
@@ -59,6 +62,8 @@ impl ContactSnapshot {
             pose: None,
             count: 0,
             points: vectors()?,
+            carried: vectors()?,
+            followed_s: 0.0,
             outward: vectors()?,
             forces: vectors()?,
             anchors: memory::filled(MOST_SAMPLES, None, WHAT)?,

@@ -27,6 +27,8 @@ const LIMITS: Limits = Limits {
 /// The samples between two steps.
 pub struct Solver {
     pub modes: Modes,
+    /// How long support groups have carried the samples since the step, s.
+    carried_s: f64,
     /// By sample: the force on it, mN; its place, mm; how far forces have moved it since the step `[3n]`, mm, and how far they will have
     /// moved it if they stay as they are.
     forces: Vec<Vector>,
@@ -55,6 +57,7 @@ impl Solver {
         memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
         Ok(Solver {
             modes,
+            carried_s: 0.0,
             forces: vectors(MOST_SAMPLES)?,
             points: vectors(MOST_SAMPLES)?,
             moved: memory::zeros(3 * MOST_SAMPLES, WHAT)?,
@@ -72,6 +75,7 @@ impl Solver {
     /// Starts anew from the state of a step. What the hand's forces moved since the last one is dropped: the step has it.
     pub fn begin(&mut self, snapshot: &ContactSnapshot) {
         self.modes.begin(&snapshot.velocity);
+        self.carried_s = 0.0;
         self.forces[..snapshot.count].copy_from_slice(&snapshot.forces[..snapshot.count]);
         self.points[..snapshot.count].copy_from_slice(&snapshot.points[..snapshot.count]);
         self.moved.fill(0.0);
@@ -100,7 +104,13 @@ impl Solver {
         (0..count).filter(|at| self.forces[*at] != Vector::ZERO)
     }
 
-    /// Where a sample is: the step's place, the modes, what forces have moved.
+    /// Lets time pass for the modes and what support groups carry.
+    pub fn advance(&mut self, snapshot: &ContactSnapshot, seconds: f64) {
+        self.modes.advance(seconds, &snapshot.drive);
+        self.carried_s = (self.carried_s + seconds).min(snapshot.followed_s);
+    }
+
+    /// Where a sample is: the step's place, what carries it, the modes, what forces have moved.
     fn place(&self, snapshot: &ContactSnapshot, at: usize) -> Vector {
         let m = snapshot.modes;
         let axis = |k: usize| {
@@ -110,7 +120,8 @@ impl Solver {
                     .modes
                     .moved(&snapshot.at_samples[row * m..(row + 1) * m])
         };
-        snapshot.points[at] + Vector::new(axis(0), axis(1), axis(2))
+        let carried = snapshot.carried[at] * self.carried_s as f32;
+        snapshot.points[at] + carried + Vector::new(axis(0), axis(1), axis(2))
     }
 
     /// Lets samples follow the forces so far, `delay_s x' + x = W f` by backward Euler. Gives the part of a change of the forces that

@@ -1,10 +1,11 @@
 //! What a published step leaves for frames after it.
 
+use super::supports::{self, GroupState};
 use crate::contact::Past;
 use crate::error::Result;
 use crate::memory;
 
-/// Velocities, tools and forces of a published step.
+/// Velocities, tools, support groups and forces of a published step.
 #[derive(Debug, Default)]
 pub struct FrameState {
     /// `[K,3]`, mm/s.
@@ -12,6 +13,9 @@ pub struct FrameState {
     /// Where the tools were, and their forces; of the step that is being made until it is published.
     pub past: Past,
     pub next: Past,
+    /// Support groups, likewise.
+    pub groups: Vec<GroupState>,
+    pub next_groups: Vec<GroupState>,
     /// Nodes in contact, ascending, and the forces on them, mN `[m,3]`; none where tools push.
     pub nodes: Vec<u32>,
     pub forces: Vec<f32>,
@@ -26,10 +30,16 @@ impl FrameState {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`]; what is published stays.
-    pub fn prepare(&mut self, past: Option<&Past>, nodes: usize) -> Result<()> {
+    pub fn prepare(
+        &mut self,
+        past: Option<&Past>,
+        groups: &[GroupState],
+        nodes: usize,
+    ) -> Result<()> {
         const WHAT: &str = "the present state of a scene";
         memory::fit(&mut self.nodes, nodes, WHAT)?;
         memory::fit(&mut self.forces, 3 * nodes, WHAT)?;
+        supports::copy(groups, &mut self.next_groups)?;
         match past {
             Some(past) => self.next.take(past),
             None => {

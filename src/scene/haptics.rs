@@ -89,6 +89,8 @@ impl Core {
             rest: &self.mesh.positions,
             u: &shared.last.field,
             took_s: self.took_s,
+            integrator: self.integrator(),
+            let_go: (self.loads.as_ref()).map_or(0, |loads| loads.let_go()),
         })
     }
 

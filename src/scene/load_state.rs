@@ -236,6 +236,11 @@ impl LoadState {
         supports::acts(&self.last.supports)
     }
 
+    /// Support groups that are let go in the step that was made last, a bit each.
+    pub(super) fn let_go(&self) -> u64 {
+        self.held.as_ref().map_or(0, |held| held.let_go)
+    }
+
     /// Whether any acts in the last published state or the one being made.
     pub(super) fn acts(&self) -> bool {
         self.last.acts || self.next.acts

@@ -8,7 +8,7 @@ use super::core::{Core, lock_read};
 use super::load_state::LoadState;
 use super::loads::{Acting, Loads, WHAT};
 use super::published::Published;
-use super::supports;
+use super::supports::{self, GroupState};
 use crate::corrections::{Corrections, Held, ImplicitSolver, SolverContext};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -85,6 +85,17 @@ impl Core {
     ) -> &'a Held {
         let own = loads.as_ref().and_then(|loads| loads.held.as_deref());
         own.unwrap_or(&corrections.body.held)
+    }
+
+    /// The support groups of the last published state, or of the one being made.
+    pub(super) fn groups(&self, next: bool) -> &[GroupState] {
+        let Some(loads) = self.loads.as_deref() else {
+            return &[];
+        };
+        match next {
+            true => &loads.next.supports,
+            false => &loads.last.supports,
+        }
     }
 
     /// No loads, of the body as it is.

@@ -203,6 +203,8 @@ impl Acting {
         if !self.acts && is_at_rest && self.pushed.is_empty() {
             return Ok(None);
         }
+        let mut groups = Vec::new();
+        supports::copy(&self.supports, &mut groups)?;
         Ok(Some(Acting {
             dead: memory::copied(&self.dead, WHAT)?,
             gravity: self.gravity,
@@ -210,7 +212,7 @@ impl Acting {
             pushed: memory::copied(&self.pushed, WHAT)?,
             acts: self.acts,
             carried: self.carried,
-            supports: self.supports.clone(),
+            supports: groups,
         }))
     }
 

@@ -8,6 +8,8 @@ use super::core::{Core, lock_read, lock_write};
 use super::frame_state::FrameState;
 use super::published::{Published, View};
 use super::shared::lock;
+use super::step_input::FrameInput;
+use super::supports;
 use super::{Scene, StepInput};
 use crate::contact::Past;
 use crate::error::{Error, Result};
@@ -18,7 +20,7 @@ use crate::output::Output;
 const WHAT: &str = "the present state of a scene";
 
 impl Scene {
-    /// The displacements `[n,3]` of a view at a moment between steps, with the instruments or nodes of `input` where they are then.
+    /// The displacements `[n,3]` of a view at a moment between steps, with the instruments or nodes and the support groups of `input` where they are then.
     ///
     /// `when` is on the clock of [`StepInput::time_s`]; where a host gives its steps no time, it is the time since the last
     /// published step, s. An input without a drive is tissue that nothing touches any more.
@@ -62,6 +64,7 @@ impl Scene {
             return Err(Error::NonFinite(format!("when is {when}")));
         }
         input.check_of_frame()?;
+        supports::check(input.loads.supports, &self.mesh.supports)?;
         lock_read(&self.shared.published).check_len(view, out.len())?;
         let _flush = FlushToZero::enter();
         let mut presenters = lock(&self.tools.presenters)?;
@@ -69,6 +72,11 @@ impl Scene {
         let cut = lock_read(&self.shared.published).cut.clone();
         let model = cut.as_ref().map_or(&self.model, |cut| &cut.0);
         let mesh = cut.as_ref().map_or(&self.mesh, |cut| &cut.0.mesh);
+        if cut.is_some() && !input.loads.supports.is_empty() {
+            return Err(Error::Unsupported(
+                "supports: the body was cut, and a support moves an intact one; pass none".into(),
+            ));
+        }
         let tissue = self.tissue(model, mesh);
         presenters.prepare(&tissue, view, || {
             let begun = lock_read(&self.shared.published).frame_state.is_some();
@@ -77,7 +85,11 @@ impl Scene {
                 false => self.with(|core, published| core.start_frame_states(published)),
             }
         })?;
-        presenters.frame(&tissue, (view, when), input.contact, out)
+        let driven = FrameInput {
+            contact: input.contact,
+            supports: input.loads.supports,
+        };
+        presenters.frame(&tissue, (view, when), driven, out)
     }
 
     /// Bytes of what presents.
@@ -101,13 +113,15 @@ impl Core {
                 velocity: memory::zeros(len, WHAT)?,
                 past: Past::with_room(1024)?,
                 next: Past::with_room(1024)?,
+                groups: Vec::new(),
+                next_groups: Vec::new(),
                 nodes: memory::room(1024, WHAT)?,
                 forces: memory::room(3 * 1024, WHAT)?,
                 step: 0,
                 time_s: 0.0,
             };
             let past = self.problem.as_ref().map(|problem| &problem.past);
-            frame_state.prepare(past, self.contact.len())?;
+            frame_state.prepare(past, self.groups(false), self.contact.len())?;
             shared.frame_state = Some(frame_state);
         }
         self.publish_frame_state(&mut shared);
@@ -123,7 +137,7 @@ impl Core {
         });
         shared.tools.fit(counts.0, counts.1, counts.2)?;
         match &mut shared.frame_state {
-            Some(frame_state) => frame_state.prepare(next, self.incoming.len()),
+            Some(frame_state) => frame_state.prepare(next, self.groups(true), self.incoming.len()),
             None => Ok(()),
         }
     }
@@ -132,7 +146,7 @@ impl Core {
     pub(super) fn fit_state(&self, published: &RwLock<Published>) -> Result<()> {
         let past = self.problem.as_ref().map(|problem| &problem.past);
         match &mut lock_write(published).frame_state {
-            Some(frame_state) => frame_state.prepare(past, self.contact.len()),
+            Some(frame_state) => frame_state.prepare(past, self.groups(false), self.contact.len()),
             None => Ok(()),
         }
     }
@@ -147,6 +161,7 @@ impl Core {
             .velocity
             .copy_from_slice(&corrected.solver.motion.velocity);
         std::mem::swap(&mut frame_state.past, &mut frame_state.next);
+        std::mem::swap(&mut frame_state.groups, &mut frame_state.next_groups);
         frame_state.nodes.clear();
         frame_state.forces.clear();
         let reaction = &corrected.solver.motion.reaction;

@@ -1,6 +1,7 @@
 //! What a step gets, and what has become of it.
 
 use super::loads::Loads;
+use super::supports::GroupMotion;
 use crate::contact::Tool;
 use crate::error::{Error, Result};
 use crate::field::ContactSet;
@@ -48,7 +49,7 @@ pub struct StepInput<'a> {
     pub displacement: Option<&'a [f32]>,
     /// What drives the step. A node that the boundary condition holds stays held.
     pub contact: Contact<'a>,
-    /// What acts on the body beside contact. A frame goes on from the loads of its step, and does not ask for these.
+    /// What acts on the body beside contact. A frame goes on from the loads of its step, and asks for none of these but `supports`.
     pub loads: Loads<'a>,
     /// The moment of the end of the step on the host's clock, s, from which [`Scene::present`](crate::Scene::present) counts; 0 for hosts
     /// that keep none. Not for a frame.
@@ -107,6 +108,14 @@ impl StepInput<'_> {
         }
         Ok(())
     }
+}
+
+/// What drives a frame.
+#[derive(Clone, Copy)]
+pub struct FrameInput<'a> {
+    pub contact: Contact<'a>,
+    /// Where support groups are; none: they go on as they went.
+    pub supports: &'a [GroupMotion<'a>],
 }
 
 /// What has become of a submitted step.

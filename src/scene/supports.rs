@@ -34,7 +34,7 @@ pub struct GroupMotion<'a> {
 /// A group in a state.
 #[derive(Debug, Clone, Default, HeldBytes, Serialize, Deserialize)]
 pub(super) struct GroupState {
-    let_go: bool,
+    pub(super) let_go: bool,
     /// `o [n,3]`, mm; empty: zero.
     #[serde(with = "stored")]
     grip: Vec<f32>,
@@ -144,7 +144,7 @@ pub(super) fn follow(
 
 impl GroupState {
     /// Becomes the group's state at the end of a step; adds to `places` where its nodes are then, if it holds them.
-    fn take(
+    pub(super) fn take(
         &mut self,
         mesh: &Mesh,
         group: &SupportSet,
@@ -245,6 +245,20 @@ pub(super) fn restored(mesh: &Mesh, states: &[GroupState]) -> Result<Option<Box<
         hold(mesh, states, &mut held)?;
     }
     Ok(held)
+}
+
+/// Copies states.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub(super) fn copy(from: &[GroupState], to: &mut Vec<GroupState>) -> Result<()> {
+    memory::fit(to, from.len(), WHAT)?;
+    to.resize_with(from.len(), GroupState::default);
+    for (from, to) in from.iter().zip(to) {
+        (to.let_go, to.moves) = (from.let_go, from.moves);
+        memory::replace(&mut to.grip, &from.grip, WHAT)?;
+    }
+    Ok(())
 }
 
 /// Whether any group is not as it was meshed.

@@ -5,37 +5,23 @@ use std::sync::Arc;
 use upt::ffi::*;
 use upt::{Contact, GroupMotion, Loads, Model, ModelOptions, Scene, StepInput, SupportPose};
 
-use crate::fixture::{bits, copy_of, find_runtime, manifest, plain, scene, write_manifest};
+use crate::fixture::{
+    bits, copy_of, find_runtime, manifest, plain, scene, with_groups, write_manifest,
+};
 use crate::host::{Host, message};
 use crate::{BUNDLE, ball, step, tool};
 
-/// A bundle whose held nodes are two groups, by their place along x.
-fn folder() -> tempfile::TempDir {
-    find_runtime();
-    let folder = copy_of(BUNDLE);
-    let model = Model::open(folder.path(), &ModelOptions::default()).unwrap();
-    let held = model.indices(upt::IndexSet::HeldNodes);
-    let x = |node: &u32| model.positions()[3 * *node as usize];
-    let mut places: Vec<f32> = held.iter().map(x).collect();
-    places.sort_by(f32::total_cmp);
-    let middle = places[places.len() / 2];
-    let (left, right): (Vec<u32>, Vec<u32>) = held.iter().partition(|node| x(node) < middle);
-    let mut manifest = manifest(folder.path());
-    manifest["supports"] = serde_json::json!([
-        {"name": "left", "nodes": left}, {"name": "right", "nodes": right},
-    ]);
-    write_manifest(folder.path(), &mut manifest);
-    folder
-}
+#[path = "led_between.rs"]
+mod led_between;
 
 /// With the folder, from which a model reads on.
 fn open() -> (tempfile::TempDir, Arc<Model>) {
-    let folder = folder();
+    let folder = with_groups(BUNDLE);
     let model = Model::open(folder.path(), &ModelOptions::default()).unwrap();
     (folder, model)
 }
 
-fn led<'a>(supports: &'a [GroupMotion<'a>]) -> StepInput<'a> {
+pub fn led<'a>(supports: &'a [GroupMotion<'a>]) -> StepInput<'a> {
     let loads = Loads {
         supports,
         ..Loads::default()

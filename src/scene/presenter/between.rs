@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::contact_response::ContactResponse;
 use super::extrapolation::{ToolPaths, VelocityExtrapolation};
+use super::led::LedGroups;
 use super::nodes::{Nodes, ResponseContext};
 use super::solves::{Drive, SolveKey, Solves};
 use super::touched::TouchedTissue;
@@ -19,7 +20,8 @@ use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::kernels::{Isa, Pool};
 use crate::memory::{self, HeldBytes};
 use crate::scene::frame_state::FrameState;
-use crate::scene::step_input::Contact;
+use crate::scene::step_input::{Contact, FrameInput};
+use crate::scene::supports::{self, GroupState};
 use crate::scene::tissue::Tissue;
 
 pub(super) const WHAT: &str = "the present state of a scene";
@@ -49,6 +51,7 @@ struct KnownStep {
     past: Past,
     then: Vec<u32>,
     forces: Vec<f32>,
+    groups: Vec<GroupState>,
     paths: ToolPaths,
 }
 
@@ -80,6 +83,7 @@ pub(super) struct Between {
     rows: Vec<u32>,
     extrapolation: VelocityExtrapolation,
     nodes: Box<Nodes>,
+    led: LedGroups,
     /// Where the host has nodes in this frame.
     now: ContactSet,
 }
@@ -121,6 +125,7 @@ impl Between {
             rows: memory::collected(natural, 0..natural as u32, WHAT)?,
             extrapolation: VelocityExtrapolation::new()?,
             nodes: memory::boxed(Nodes::default(), WHAT)?,
+            led: LedGroups::default(),
             now: ContactSet::default(),
         })
     }
@@ -147,6 +152,7 @@ impl Between {
         other.past.take(&frame_state.past)?;
         memory::replace(&mut other.then, &frame_state.nodes, WHAT)?;
         memory::replace(&mut other.forces, &frame_state.forces, WHAT)?;
+        supports::copy(&frame_state.groups, &mut other.groups)?;
         other.step = Some(frame_state.step);
         self.give_back();
         Ok(())
@@ -161,6 +167,7 @@ impl Between {
             past,
             then,
             forces,
+            groups,
             paths,
         } = &mut self.other;
         swap(&mut self.step, step);
@@ -169,6 +176,7 @@ impl Between {
         swap(&mut self.problem.past, past);
         swap(&mut self.nodes.then, then);
         swap(&mut self.nodes.forces, forces);
+        swap(&mut self.led.states, groups);
         swap(&mut self.extrapolation.paths, paths);
     }
 
@@ -180,7 +188,7 @@ impl Between {
         &mut self,
         scene: &Tissue<'_>,
         tau: f64,
-        driven: Contact<'_>,
+        driven: FrameInput<'_>,
         (view, solves): (ShownNodes<'_>, &mut Solves),
         out: &mut [f32],
     ) -> Result<()> {
@@ -194,7 +202,8 @@ impl Between {
         let alpha = scene.integrator.damping_per_s;
         let rest = scene.mesh.positions.as_slice();
         // Without a drive the tools of the last step have left, or its nodes are released.
-        let driven = match driven {
+        let FrameInput { contact, supports } = driven;
+        let driven = match contact {
             Contact::None if self.nodes.then.is_empty() => Contact::Tools(&[]),
             other => other,
         };
@@ -210,10 +219,19 @@ impl Between {
                 self.extrapolation.follow_evenly(stretch, (tau, alpha));
             }
         }
+        let (fields, groups) = ((rest, last, velocity), corrections.groups.as_slice());
+        self.led.look(
+            (scene.mesh, groups),
+            supports,
+            &self.extrapolation,
+            fields,
+            &mut self.free,
+        )?;
         let question = SolveKey {
             step,
             tau,
             extrapolation: &self.extrapolation,
+            led: self.led.key(),
             drive: match driven {
                 Contact::Tools(tools) => Drive::Tools(tools),
                 _ => Drive::Nodes(&self.now),
@@ -227,8 +245,9 @@ impl Between {
             (None, Drive::Nodes(now)) => &now.nodes,
         };
         for nodes in [touched, view.region] {
-            let fields = (rest, last, velocity);
-            self.extrapolation.follow(nodes, fields, &mut self.free);
+            let moved = |node, u| self.led.moved(groups, node, u);
+            self.extrapolation
+                .follow(nodes, fields, moved, &mut self.free);
         }
         let make = |q: &mut [f32]| -> Result<bool> {
             let kappa = scene.integrator.over(tau.max(AT_ONCE_S)).kappa();
@@ -345,11 +364,11 @@ impl Between {
     pub(super) fn sinks(
         &mut self,
         scene: &Tissue<'_>,
-        driven: Contact<'_>,
+        driven: FrameInput<'_>,
         solves: &Solves,
         (region, u): (&[u32], &[f32]),
     ) -> Result<bool> {
-        let (Some(prior), Contact::Tools(tools)) = (&scene.model.prior, driven) else {
+        let (Some(prior), Contact::Tools(tools)) = (&scene.model.prior, driven.contact) else {
             return Ok(false);
         };
         let (rest, last) = (scene.mesh.positions.as_slice(), self.last.as_slice());

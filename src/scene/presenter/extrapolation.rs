@@ -145,19 +145,20 @@ impl VelocityExtrapolation {
         (&self.driven, self.free)
     }
 
-    /// `out = last + along velocity` at some nodes.
+    /// `out = last + along velocity` at some nodes, and what is made of that.
     pub(super) fn follow(
         &self,
         nodes: &[u32],
         (rest, last, velocity): (&[f32], &[f32], &[f32]),
+        moved: impl Fn(u32, [f32; 3]) -> [f32; 3],
         out: &mut [f32],
     ) {
         let at = self.each();
         let [rest, last, velocity] = [rest, last, velocity].map(|field| field.as_chunks::<3>().0);
         let out = out.as_chunks_mut::<3>().0;
-        for &node in nodes {
-            let node = node as usize;
-            out[node] = at(&rest[node], &last[node], &velocity[node]);
+        for &own in nodes {
+            let node = own as usize;
+            out[node] = moved(own, at(&rest[node], &last[node], &velocity[node]));
         }
     }
 
@@ -246,7 +247,8 @@ mod tests {
         };
         let rest = [0.0, 0.0, 0.0, 100.0, 0.0, 0.0, 50.0, 0.0, 0.0];
         let mut out = [0.0; 9];
-        extrapolation.follow(&[0, 1, 2], (&rest, &[0.0; 9], &[1.0; 9]), &mut out);
+        let fields = (&rest[..], &[0.0; 9][..], &[1.0; 9][..]);
+        extrapolation.follow(&[0, 1, 2], fields, |_, u| u, &mut out);
         assert!(
             out[0] < 1e-3 && out[3] > 0.9 && out[6] > 0.7 && out[6] < 0.9,
             "{out:?}"

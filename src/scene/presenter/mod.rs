@@ -4,6 +4,7 @@
 mod between;
 mod contact_response;
 mod extrapolation;
+mod led;
 mod nodes;
 mod solves;
 mod step_blend;
@@ -16,7 +17,7 @@ use std::sync::Arc;
 use super::core::lock_read;
 use super::points::AttachedPoints;
 use super::published::{Published, View};
-use super::step_input::Contact;
+use super::step_input::FrameInput;
 use super::tissue::Tissue;
 use crate::error::{Error, Result};
 use crate::kernels::rows::RowPlan;
@@ -89,7 +90,7 @@ impl Presenters {
         &mut self,
         scene: &Tissue<'_>,
         (view, when): (View, f64),
-        driven: Contact<'_>,
+        driven: FrameInput<'_>,
         out: Output<'_, f32>,
     ) -> Result<()> {
         let presenter = match view {
@@ -165,7 +166,7 @@ impl Presenter {
         &mut self,
         scene: &Tissue<'_>,
         when: f64,
-        driven: Contact<'_>,
+        driven: FrameInput<'_>,
         solves: &mut Solves,
         out: Output<'_, f32>,
     ) -> Result<()> {
@@ -218,7 +219,7 @@ impl Presenter {
         &mut self,
         scene: &Tissue<'_>,
         tau: f64,
-        driven: Contact<'_>,
+        driven: FrameInput<'_>,
         solves: &mut Solves,
         out: &mut [f32],
     ) -> Result<()> {
@@ -235,7 +236,7 @@ impl Presenter {
         &mut self,
         scene: &Tissue<'_>,
         (step, tau): (u64, f64),
-        driven: Contact<'_>,
+        driven: FrameInput<'_>,
         solves: &mut Solves,
         out: &mut [f32],
     ) -> Result<()> {

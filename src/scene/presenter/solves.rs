@@ -27,6 +27,8 @@ pub(super) struct SolveKey<'a> {
     /// Time after the step, s.
     pub tau: f64,
     pub extrapolation: &'a VelocityExtrapolation,
+    /// Nodes of support groups, and where they are.
+    pub led: &'a [(u32, [f32; 3])],
     pub drive: Drive<'a>,
 }
 
@@ -38,6 +40,7 @@ struct Solve {
     tau: f64,
     driven: Vec<(Vector, f32)>,
     free: f32,
+    led: Vec<(u32, [f32; 3])>,
     by_tools: bool,
     tools: Vec<Tool>,
     nodes: ContactSet,
@@ -64,6 +67,7 @@ impl Solve {
             && self.tau.to_bits() == question.tau.to_bits()
             && self.free.to_bits() == free.to_bits()
             && self.driven == driven
+            && self.led == question.led
             && match question.drive {
                 Drive::Tools(tools) => {
                     let pairs = || self.tools.iter().zip(tools);
@@ -84,6 +88,7 @@ impl Solve {
         self.tau = question.tau;
         self.free = free;
         memory::replace(&mut self.driven, driven, WHAT)?;
+        memory::replace(&mut self.led, question.led, WHAT)?;
         self.tools.clear();
         self.nodes.clear();
         match question.drive {
