@@ -73,9 +73,10 @@ fn tools_allocate_nothing() {
     }
 }
 
-/// A ball presses while gravity turns, the surface is under pressure, the support moves, and ties are drawn taut, slack and broken.
+/// A ball presses while gravity turns, the surface is under pressure, the support and one of its groups move, and ties are drawn taut, slack and broken.
 fn loads_allocate_nothing() {
-    let model = model("tiny-corrected");
+    let folder = fixture::with_groups("tiny-corrected");
+    let model = upt::Model::open(folder.path(), &upt::ModelOptions::default()).unwrap();
     let scene = scene(&model, &plain());
     let node = model.indices(IndexSet::DomainNodes)[0] as usize;
     let at: Vec<f32> = model.positions()[3 * node..3 * node + 3].to_vec();
@@ -102,7 +103,8 @@ fn loads_allocate_nothing() {
         tie(domain[1], 2.0),
         tie(domain[2], 0.0),
     ];
-    let turn = || {
+    let mut shown = forces.clone();
+    let mut turn = || {
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         for t in 0..20 {
             let wave = (0.314 * t as f32).sin();
@@ -118,6 +120,14 @@ fn loads_allocate_nothing() {
                     pascal: -4.0,
                 },
             ];
+            let groups = [upt::GroupMotion {
+                group: 1,
+                pose: Some(upt::SupportPose {
+                    position: [0.0, 0.1 * wave, 0.2 * wave],
+                    rotation: [0.0, 0.0, 0.0, 1.0],
+                }),
+                ..upt::GroupMotion::default()
+            }];
             let loads = upt::Loads {
                 gravity: [wave, 0.0, -1.0],
                 forces: Some(&forces),
@@ -127,6 +137,7 @@ fn loads_allocate_nothing() {
                     rotation: [0.0, 0.0, 0.0, 1.0],
                 }),
                 ties: &ties[..if t % 5 == 0 { 0 } else { 3 }],
+                supports: &groups,
                 ..upt::Loads::NONE
             };
             let tools = [tool];
@@ -139,12 +150,16 @@ fn loads_allocate_nothing() {
                 ..StepInput::default()
             };
             scene.step(input, None).unwrap();
+            scene
+                .present(input, 0.01, View::Region, &mut shown)
+                .unwrap();
         }
         ALLOCATIONS.load(Ordering::Relaxed) - before
     };
-    turn();
+    // What the group moves comes to other samples of contact, and more of them, for some turns.
+    (0..4).for_each(|_| _ = turn());
     let count = (0..5).map(|_| turn()).min().unwrap();
-    assert_eq!(count, 0, "steps under loads");
+    assert_eq!(count, 0, "steps and frames under loads");
 }
 
 /// Frames of the region and of attached points between the steps.

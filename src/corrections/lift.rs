@@ -42,16 +42,17 @@ impl Group {
 
 /// `b_j` of nodes at rest.
 fn functions(rest: &[f32], nodes: &[u32]) -> Result<Vec<Vec<f32>>> {
-    let mut made: Vec<Vec<f64>> = vec![vec![1.0; nodes.len()]];
+    let mut made: Vec<Vec<f64>> = memory::room(4, WHAT)?;
+    made.push(memory::filled(nodes.len(), 1.0, WHAT)?);
     let spread = |own: &[f64]| {
         (own.iter().map(|value| value * value).sum::<f64>() / own.len() as f64).sqrt()
     };
     let mut widest = 0.0f64;
     for axis in 0..3 {
-        let mut own: Vec<f64> = nodes
+        let along = nodes
             .iter()
-            .map(|node| f64::from(rest[3 * *node as usize + axis]))
-            .collect();
+            .map(|node| f64::from(rest[3 * *node as usize + axis]));
+        let mut own: Vec<f64> = memory::collected(nodes.len(), along, WHAT)?;
         for other in &made {
             let part: f64 = own.iter().zip(other).map(|(a, b)| a * b).sum();
             let part = part / nodes.len() as f64;
@@ -142,11 +143,10 @@ impl ImplicitSolver {
 
     /// What loads and what is held ask of a step, before it begins.
     pub(super) fn expect(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<()> {
-        if self.let_go != context.held.let_go {
-            // The pairs and the near sets are those of another boundary.
+        self.stand_on(context.held.let_go);
+        if self.let_go_before != self.let_go {
+            // The pairs are those of another boundary, also where the step is made again.
             self.clear_pairs();
-            self.local = None;
-            self.let_go = context.held.let_go;
         }
         let has_load = input.load.is_some() || context.held.let_go != 0;
         self.preconditioner.expect_load(context.env(), has_load)

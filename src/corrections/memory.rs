@@ -69,15 +69,14 @@ impl Memory {
     /// A copy of the published pairs, oldest first.
     pub fn pairs(&self) -> Result<Vec<Pair>> {
         let copied = |values: &[f32]| memory::copied(values, "a copy of L-BFGS pairs");
-        let slots = self.published.iter();
-        slots
-            .map(|&slot| {
-                Ok(Pair {
-                    step: copied(&self.steps[slot])?,
-                    change: copied(&self.changes[slot])?,
-                })
-            })
-            .collect()
+        let mut pairs = memory::room(self.published.len(), "a copy of L-BFGS pairs")?;
+        for &slot in &self.published {
+            pairs.push(Pair {
+                step: copied(&self.steps[slot])?,
+                change: copied(&self.changes[slot])?,
+            });
+        }
+        Ok(pairs)
     }
 
     /// Leaves the nodes out of every product until the next call.

@@ -55,8 +55,9 @@ pub struct ImplicitSolver {
     /// Made at the first step that tools drive.
     pub(super) local: Option<Box<LocalSolver>>,
     pub(super) free: Oscillators,
-    /// The support groups that are let go in what it remembers.
+    /// The support groups that are let go in the step being made, and in the last published state, of which the pairs are.
     pub(super) let_go: u64,
+    pub(super) let_go_before: u64,
 }
 
 impl ImplicitSolver {
@@ -94,6 +95,7 @@ impl ImplicitSolver {
             local: None,
             free: Oscillators::default(),
             let_go: context.held.let_go,
+            let_go_before: context.held.let_go,
         })
     }
 
@@ -102,6 +104,16 @@ impl ImplicitSolver {
         self.motion.clear();
         self.clear_pairs();
         self.commit_pairs();
+    }
+
+    /// What is near is that of a boundary of which these groups are let go.
+    pub(super) fn stand_on(&mut self, let_go: u64) {
+        if self.let_go != let_go
+            && let Some(local) = &mut self.local
+        {
+            local.leave_boundary();
+        }
+        self.let_go = let_go;
     }
 
     /// Forgets the pairs, in the step being made.
@@ -134,6 +146,7 @@ impl ImplicitSolver {
     pub fn commit(&mut self) {
         self.leave_level();
         std::mem::swap(&mut self.motion, &mut self.next);
+        self.let_go_before = self.let_go;
         self.commit_pairs();
     }
 
@@ -195,10 +208,8 @@ impl ImplicitSolver {
         let sizes = [corrections.body.mass.len(), corrections.space.count()];
         local.iter().try_for_each(|record| record.check(sizes))?;
         self.motion.take(motion)?;
-        if self.let_go != context.held.let_go {
-            self.local = None;
-            self.let_go = context.held.let_go;
-        }
+        self.stand_on(context.held.let_go);
+        self.let_go_before = self.let_go;
         self.clear_pairs();
         self.commit_pairs();
         for Pair { step, change } in pairs {

@@ -1,22 +1,23 @@
-//! All that holds and loads an organ at once, at random: gravity, pressure, a support that moves, a bed, ties and a ball.
+//! All that holds and loads an organ at once, at random: gravity, pressure, a support that moves, a support group that is led, let go and held again, a bed, ties and a ball.
 //!
 //! 160 steps; 10,000 with `UPT_NIGHTLY=1`. `UPT_FUZZ_SEED` is where their numbers begin. The counts are printed.
 
-use std::path::Path;
-
 use upt::contact::Tool;
 use upt::{
-    Bed, Contact, Corrections, Loads, Model, ModelOptions, Pressure, Scene, SceneOptions, Shape,
-    Spring, StepInput, SupportPose, Tie, TieEnd, TiePoint, Vector,
+    Bed, Contact, Corrections, GroupMotion, Loads, Model, ModelOptions, Pressure, Scene,
+    SceneOptions, Shape, Spring, StepInput, SupportPose, Tie, TieEnd, TiePoint, Vector,
 };
 
-use crate::fixture::find_runtime;
+use crate::fixture::with_groups;
 use crate::ties::place;
 
 /// Steps after which other ties take the place of those that there are, and the ball leaps.
 const TO_A_SITE: usize = 20;
 /// How far a new tie pulls at once, mm; every fourth the second. The bundle's bound is 32 mm.
 const PULLED_MM: [f32; 2] = [6.0, 20.0];
+
+/// How far the group is led in a step, mm.
+const LED_MM: f32 = 0.3;
 
 struct Draw(u64);
 
@@ -103,9 +104,8 @@ fn random_loads_together_invert_no_element() {
         0 => 160,
         _ => 10_000,
     };
-    find_runtime();
-    let path = Path::new("onnx/brain-coarse-reduced");
-    let model = Model::open(path, &ModelOptions::default()).unwrap();
+    let folder = with_groups("../../onnx/brain-coarse-reduced");
+    let model = Model::open(folder.path(), &ModelOptions::default()).unwrap();
     let options = SceneOptions {
         corrections: Corrections::Fixed(10),
         ..SceneOptions::default()
@@ -116,6 +116,7 @@ fn random_loads_together_invert_no_element() {
     let mut counts = Counts::default();
     let (mut ties, mut site, mut ball) = (Vec::new(), Vector::ZERO, Vector::ZERO);
     let (mut gravity, mut lift) = ([0.0; 3], 0.0);
+    let (mut led, mut let_go) = ([0.0; 3], false);
     let shape = Shape::Sphere { radius: 4.0 };
     for step in 0..steps {
         if step % TO_A_SITE == 0 {
@@ -144,6 +145,18 @@ fn random_loads_together_invert_no_element() {
         }
         ball += (site + draw.aside(3.0) - ball) * 0.1 + draw.aside(0.2);
         lift += draw.within(-0.2, 0.2);
+        // The group comes back from time to time, so that it is nowhere far away.
+        led = (Vector::from(led) * 0.98 + draw.aside(LED_MM)).to_array();
+        let_go ^= draw.next() < 0.03;
+        let groups = [GroupMotion {
+            group: 1,
+            let_go,
+            pose: Some(SupportPose {
+                position: led,
+                rotation: [0.0, 0.0, 0.0, 1.0],
+            }),
+            displacements: None,
+        }];
         let mut tool = Tool::new(&shape, ball.to_array(), [0.0, 0.0, 0.0, 1.0]).unwrap();
         tool.friction = 0.3;
         let pressures = [Pressure {
@@ -158,6 +171,7 @@ fn random_loads_together_invert_no_element() {
                 rotation: [0.0, 0.0, 0.0, 1.0],
             }),
             ties: &ties,
+            supports: &groups,
             ..Loads::default()
         };
         let tools = [tool];

@@ -149,6 +149,33 @@ impl Rig {
         self.give(status, &out)
     }
 
+    /// A step, or a frame after it where `seconds` is not zero, in which a group is led up by `lift` mm or let go, under a little gravity.
+    pub fn lead(&mut self, lift: f32, let_go: bool, seconds: f64) -> i32 {
+        let groups = [upt_support {
+            group: 1,
+            let_go: let_go.into(),
+            position: [0.0, 0.0, lift],
+            ..upt_support::HELD
+        }];
+        let input = upt_input {
+            supports: groups.as_ptr(),
+            support_count: 1,
+            gravity: [0.0, 0.0, -0.5],
+            ..upt_input::of_instruments(&self.tools[..1])
+        };
+        let scene = self.scene;
+        if seconds > 0.0 {
+            let mut out = vec![0.0f32; self.positions.len()];
+            let (to, floats) = (out.as_mut_ptr(), out.len() as u64);
+            let status = counted(|| unsafe {
+                upt_scene_present(scene, &input, seconds, null(), to, floats)
+            });
+            return self.give(status, &out);
+        }
+        let status = counted(|| unsafe { upt_scene_step(scene, &input, null_mut(), 0) });
+        self.shown(status)
+    }
+
     pub fn present_points(&mut self) -> i32 {
         let mut out = vec![0.0f32; self.positions.len()];
         let input = upt_input::of_instruments(&self.tools);

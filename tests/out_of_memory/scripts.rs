@@ -65,6 +65,28 @@ pub const CUT: &[Call] = &[
     ("a step after a reset", |rig| rig.drive(1.0)),
 ];
 
+/// Those of a scene whose bundle has support groups.
+pub const GROUPS: &[Call] = &[
+    OPEN,
+    CREATE,
+    ("a first step with two tools", |rig| rig.drive(0.5)),
+    ("upt_haptics_create", Rig::feel),
+    ("a step that leads a group", |rig| rig.lead(0.2, false, 0.0)),
+    ("a frame with a group", |rig| rig.lead(0.3, false, 0.02)),
+    ("a step that lets a group go", |rig| {
+        rig.lead(0.0, true, 0.0)
+    }),
+    ("a step that holds it again", |rig| {
+        rig.lead(0.0, false, 0.0)
+    }),
+    ("upt_scene_save of groups", Rig::save),
+    ("a frame with a group held again", |rig| {
+        rig.lead(0.1, false, 0.02)
+    }),
+    ("upt_scene_restore of groups", Rig::restore),
+    ("a step after that", |rig| rig.lead(0.2, false, 0.0)),
+];
+
 /// Those of a scene that does not.
 pub const PLAIN: &[Call] = &[
     OPEN,

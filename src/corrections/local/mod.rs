@@ -262,6 +262,11 @@ impl LocalSolver {
         Ok(())
     }
 
+    /// Another boundary holds the body: what is near is made anew, and the factor, by whose number others know its columns.
+    pub(super) fn leave_boundary(&mut self) {
+        self.near.is_whole = false;
+    }
+
     /// Whether all nodes that the tools push are inside.
     pub(super) fn holds_loads(&self, problem: &ContactProblem, held: &[bool]) -> bool {
         let mut holds = true;

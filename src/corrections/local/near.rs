@@ -74,7 +74,7 @@ pub(in crate::corrections) struct NearSet {
     /// Coordinates of the blocks that near nodes are of.
     pub ranges: Vec<Range<usize>>,
     /// No error has left something half made.
-    is_whole: bool,
+    pub(super) is_whole: bool,
 }
 
 impl NearSet {

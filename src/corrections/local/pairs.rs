@@ -81,14 +81,13 @@ impl Pairs {
 
     /// A copy of the published pairs, oldest first.
     pub fn copy(&self) -> Result<Vec<Record>> {
-        let slots = self.published.iter();
-        slots
-            .map(|&slot| {
-                let mut copy = Record::default();
-                copy.take(&self.records[slot])?;
-                Ok(copy)
-            })
-            .collect()
+        let mut copies = memory::room(self.published.len(), WHAT)?;
+        for &slot in &self.published {
+            let mut copy = Record::default();
+            copy.take(&self.records[slot])?;
+            copies.push(copy);
+        }
+        Ok(copies)
     }
 
     /// Takes what was copied.

@@ -13,9 +13,12 @@ use crate::stored;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, HeldBytes)]
 pub struct Record {
     /// Nodes that the tools touched when it was made, thinned out, and the centres of what was near.
+    #[serde(with = "stored")]
     pub about: Vec<u32>,
+    #[serde(with = "stored")]
     pub centres: Vec<u32>,
     /// Inside nodes then.
+    #[serde(with = "stored")]
     pub nodes: Vec<u32>,
     /// The step, and what it changed: `[3 S]` at these nodes each, and by mode.
     #[serde(with = "stored")]
