@@ -42,8 +42,10 @@ static ALLOCATOR: Counting = Counting;
 
 /// A ball that presses, slides and lifts, again and again.
 fn tools_allocate_nothing() {
-    for name in ["tiny-reduced", "tiny-corrected"] {
-        let model = model(name);
+    let branches = serde_json::json!([{"share": 0.4, "tau_s": 0.1}]);
+    let (_folder, relaxing) = fixture::relaxing(branches, 1.0);
+    let both = ["tiny-reduced", "tiny-corrected"].map(|name| (name, model(name)));
+    for (name, model) in both.into_iter().chain([("relaxing", relaxing)]) {
         let scene = scene(&model, &plain());
         let node = model.indices(IndexSet::DomainNodes)[0] as usize;
         let at: Vec<f32> = model.positions()[3 * node..3 * node + 3].to_vec();

@@ -357,6 +357,11 @@ pub struct Manifest {
 }
 
 impl Manifest {
+    /// The material as the bundle's steps see it: with the modulus `g(dt_s)` of tissue that relaxes.
+    pub fn step_material(&self) -> elements::Material {
+        self.material.in_steps_of(self.dt_s)
+    }
+
     /// Length of step for a scene that presents and corrects as the bundle recommends, s: `dt_s` where a scene cannot present or has
     /// no step of its own.
     pub fn frame_step_s(&self) -> f64 {

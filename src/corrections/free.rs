@@ -22,7 +22,8 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         let mut report = Report::default();
         let rests = |field: &[f32]| field.iter().all(|value| *value == 0.0);
-        let is_free = input.load.is_none();
+        let pushes = self.relaxing.as_ref().is_some_and(|own| !own.rests());
+        let is_free = input.load.is_none() && !pushes;
         if is_free && rests(input.last) && rests(input.before) && (input.still || self.rests()) {
             next.fill(0.0);
             self.load.clear();

@@ -40,6 +40,7 @@ impl GravityResponse {
             before: &zero,
             still: true,
             load: None,
+            way: [0.0, 1.0],
             enough: Enough {
                 iterations: ITERATIONS,
                 error_mm: 0.0,

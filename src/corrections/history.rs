@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::local::{Linearisation, Record};
 use super::motion::Motion;
+use super::relaxing::Remembered;
 use crate::error::{Error, Result};
 use crate::stored;
 
@@ -32,6 +33,8 @@ pub struct History {
     pub local: Vec<Record>,
     /// Where their tangent was taken.
     pub linearisation: Linearisation,
+    /// Stresses of tissue that relaxes.
+    pub relaxing: Option<Remembered>,
 }
 
 impl History {
@@ -45,6 +48,8 @@ impl History {
             pairs,
             local,
             linearisation,
+            // Against the elements of the scene: `ImplicitSolver::admit`.
+            relaxing: _,
         } = self;
         motion.check(len, contacts)?;
         if pairs.len().max(local.len()) > PAIRS {

@@ -64,6 +64,8 @@ pub struct Input<'a> {
     pub still: bool,
     /// Loads beside contact, where there are any.
     pub load: Option<Load<'a>>,
+    /// The parts of the scene's step at which this one starts and ends.
+    pub way: [f32; 2],
     /// When to stop.
     pub enough: Enough,
 }

@@ -43,6 +43,27 @@ impl ImplicitSolver {
         self.take_load(input, step_s as f32)
     }
 
+    /// Velocities of a state that the model predicted and nothing corrected.
+    pub fn follow(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        next: &[f32],
+    ) -> Result<()> {
+        self.memory.begin();
+        self.load.clear();
+        self.finish(context, input, next)
+    }
+
+    /// The state being made is one that no equation of motion led to: without velocity.
+    pub fn stop_next(&mut self) {
+        self.next.velocity.fill(0.0);
+        self.next.velocity_before.fill(0.0);
+        self.next.inertia.fill(0.0);
+        self.next.truncated_mm = 0.0;
+        self.clear_pairs();
+    }
+
     /// Velocity and inertia at `next`, the end of the step from `last`, and what a step of this length leaves out.
     pub(super) fn finish(
         &mut self,

@@ -38,12 +38,16 @@ pub struct Load<'a> {
     pub way: [f32; 2],
 }
 
+/// The parts of a scene's step at which the `part`-th of `count` substeps starts and ends.
+pub(super) fn part_of(part: u32, count: u32) -> [f32; 2] {
+    [part - 1, part].map(|part| part as f32 / count as f32)
+}
+
 impl Load<'_> {
     /// That of a substep, the `part`-th of `count`.
     pub(super) fn of_part(self, part: u32, count: u32) -> Self {
-        let at = |part: u32| part as f32 / count as f32;
         Load {
-            way: [at(part - 1), at(part)],
+            way: part_of(part, count),
             ..self
         }
     }

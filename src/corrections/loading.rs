@@ -8,16 +8,22 @@ use crate::memory;
 impl ImplicitSolver {
     /// Takes the loads of the step: those at its end off the drift.
     pub(super) fn take_load(&mut self, input: &Input<'_>, step_s: f32) -> Result<()> {
-        let Some(load) = &input.load else {
+        if input.load.is_none() && self.relaxing.is_none() {
             self.load.clear();
             return Ok(());
-        };
+        }
         memory::fit(&mut self.load, self.drift.len(), "the loads of a scene")?;
         self.load.resize(self.drift.len(), 0.0);
         let ahead = if input.still { 0.0 } else { step_s };
         let (last, velocity) = (input.last, &self.motion.velocity);
         let there = |at: usize| last[at] + ahead * velocity[at];
-        load.evaluate(1, input.rest, there, &mut self.load);
+        match &input.load {
+            Some(load) => load.evaluate(1, input.rest, there, &mut self.load),
+            None => self.load.fill(0.0),
+        }
+        if let Some(relaxing) = &self.relaxing {
+            relaxing.add(input.way[1], &mut self.load);
+        }
         for (drift, load) in self.drift.iter_mut().zip(&self.load) {
             *drift -= load;
         }
@@ -26,10 +32,14 @@ impl ImplicitSolver {
 
     /// The mean load over the step into `q`; false where there is none.
     pub(super) fn mean_load(&mut self, input: &Input<'_>) -> bool {
-        let Some(load) = &input.load else {
-            return false;
-        };
-        load.evaluate(0, input.rest, |at| input.last[at], &mut self.q);
+        match &input.load {
+            Some(load) => load.evaluate(0, input.rest, |at| input.last[at], &mut self.q),
+            None if self.relaxing.is_none() => return false,
+            None => self.q.fill(0.0),
+        }
+        if let Some(relaxing) = &self.relaxing {
+            relaxing.add(input.way[0], &mut self.q);
+        }
         for (mean, end) in self.q.iter_mut().zip(&self.load) {
             *mean = 0.5 * (*mean + end);
         }

@@ -30,6 +30,8 @@ mod oscillators;
 mod passes;
 mod precondition;
 mod prescribed;
+mod relaxing;
+mod remember;
 mod solver;
 mod substepper;
 mod substeps;
@@ -95,7 +97,7 @@ impl Corrections {
     ) -> Result<Corrections> {
         let manifest = &files.manifest;
         let (entry, prior) = needed(manifest, prior)?;
-        let material = &manifest.material;
+        let material = &manifest.step_material();
         let integrator = Integrator {
             step_s: manifest.dt_s,
             damping_per_s: material.damping_per_s,

@@ -12,6 +12,7 @@ use super::motion::Motion;
 use super::oscillators::Oscillators;
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask};
+use super::relaxing::Relaxing;
 use crate::error::{Error, Result};
 use crate::kernels::vectors::{PartialSums, dots};
 use crate::memory::{self, HeldBytes};
@@ -58,6 +59,8 @@ pub struct ImplicitSolver {
     /// The support groups that are let go in the step being made, and in the last published state, of which the pairs are.
     pub(super) let_go: u64,
     pub(super) let_go_before: u64,
+    /// Of tissue that relaxes.
+    pub(super) relaxing: Option<Box<Relaxing>>,
 }
 
 impl ImplicitSolver {
@@ -96,12 +99,16 @@ impl ImplicitSolver {
             free: Oscillators::default(),
             let_go: context.held.let_go,
             let_go_before: context.held.let_go,
+            relaxing: Relaxing::new(context)?,
         })
     }
 
     /// Back to rest.
     pub fn reset(&mut self) {
         self.motion.clear();
+        if let Some(relaxing) = &mut self.relaxing {
+            relaxing.clear();
+        }
         self.clear_pairs();
         self.commit_pairs();
     }
@@ -147,6 +154,9 @@ impl ImplicitSolver {
         self.leave_level();
         std::mem::swap(&mut self.motion, &mut self.next);
         self.let_go_before = self.let_go;
+        if let Some(relaxing) = &mut self.relaxing {
+            relaxing.commit();
+        }
         self.commit_pairs();
     }
 
@@ -158,15 +168,6 @@ impl ImplicitSolver {
         {
             local.pairs.clear();
         }
-    }
-
-    /// The state being made is one that no equation of motion led to: without velocity.
-    pub fn stop_next(&mut self) {
-        self.next.velocity.fill(0.0);
-        self.next.velocity_before.fill(0.0);
-        self.next.inertia.fill(0.0);
-        self.next.truncated_mm = 0.0;
-        self.clear_pairs();
     }
 
     /// A copy of what is remembered, with the forces at `contacts` nodes.
@@ -190,6 +191,10 @@ impl ImplicitSolver {
                 Some(local) => local.factor.copy()?,
                 None => Linearisation::default(),
             },
+            relaxing: match &self.relaxing {
+                Some(relaxing) => Some(relaxing.remembered()?),
+                None => None,
+            },
         })
     }
 
@@ -203,6 +208,7 @@ impl ImplicitSolver {
             pairs,
             local,
             linearisation,
+            relaxing,
         } = history;
         let corrections = context.corrections;
         let sizes = [corrections.body.mass.len(), corrections.space.count()];
@@ -210,6 +216,11 @@ impl ImplicitSolver {
         self.motion.take(motion)?;
         self.stand_on(context.held.let_go);
         self.let_go_before = self.let_go;
+        match (&mut self.relaxing, relaxing) {
+            (Some(own), Some(remembered)) => own.restore(remembered),
+            (Some(own), None) => own.clear(),
+            (None, _) => {}
+        }
         self.clear_pairs();
         self.commit_pairs();
         for Pair { step, change } in pairs {
@@ -222,18 +233,6 @@ impl ImplicitSolver {
         let solver = LocalSolver::made(&mut self.local, context)?;
         solver.factor.restore(linearisation)?;
         solver.pairs.restore(local)
-    }
-
-    /// Velocities of a state that the model predicted and nothing corrected.
-    pub fn follow(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        next: &[f32],
-    ) -> Result<()> {
-        self.memory.begin();
-        self.load.clear();
-        self.finish(context, input, next)
     }
 
     /// `r(u)` to `out`, zero at held and prescribed nodes; returns the smallest det F and `r . d` with a field that is zero there.

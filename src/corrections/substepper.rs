@@ -7,6 +7,7 @@ use std::mem::swap;
 use std::sync::Arc;
 
 use super::input::{Enough, Input, Report, SolverContext};
+use super::load::part_of;
 use super::motion::Motion;
 use super::oscillators::Oscillators;
 use super::precondition::Preconditioner;
@@ -158,6 +159,7 @@ impl ImplicitSolver {
         next: &mut [f32],
     ) -> Result<Report> {
         self.begin_pairs();
+        self.remember(context, input)?;
         let enough = Enough {
             iterations: input.enough.iterations.max(LEAST_SWING),
             ..input.enough
@@ -199,6 +201,7 @@ impl ImplicitSolver {
                 before: &substepper.before,
                 still: false,
                 load: input.load.map(|load| load.of_part(part, substepper.count)),
+                way: part_of(part, substepper.count),
                 ..*input
             };
             let report = self.swing_once(short, &own, &mut substepper.next)?;

@@ -4,6 +4,7 @@
 use ::contact::{Pose, Vector, pose};
 
 use super::input::{Enough, Input, Report, SolverContext};
+use super::load::part_of;
 use super::solver::{ImplicitSolver, SMALLEST_DET};
 use super::substepper::Substepper;
 use crate::contact::{ContactProblem, Delassus, MAX_TIES, MAX_TOOLS, Past, Placed, Tool};
@@ -75,6 +76,7 @@ impl ImplicitSolver {
         next: &mut [f32],
     ) -> Result<Report> {
         problem.work.end_by(input.enough.until);
+        self.remember(context, input)?;
         let Some((substeps, substepper)) = substeps else {
             return self.correct_loaded(context, input, problem, next);
         };
@@ -184,6 +186,7 @@ impl ImplicitSolver {
                 before,
                 enough,
                 load: input.load.map(|load| load.of_part(part, count)),
+                way: part_of(part, count),
                 ..*input
             };
             let report = self.make_loaded(short, &own, problem, next, false)?;

@@ -39,7 +39,7 @@ impl Model {
         let changes = body.changes();
         let mesh = self.mesh.cut(body, &changes)?;
         let own = prior.cut(&mesh, body.parents())?;
-        let material = &self.manifest.material;
+        let material = &self.manifest.step_material();
         let priors = (&**prior, &own);
         let corrections = intact.cut((&self.mesh, &mesh), (body, &changes), material, priors)?;
         let corrections = crate::memory::boxed(corrections, "the corrections of a cut body")?;
@@ -72,7 +72,7 @@ impl Model {
         let Some(prior) = &self.prior else {
             return Ok(());
         };
-        let material = &self.manifest.material;
+        let material = &self.manifest.step_material();
         (self.corrections()?).cut_loads(cut.corrections()?, (&self.mesh, body), material, prior)
     }
 }

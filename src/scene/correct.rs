@@ -45,7 +45,7 @@ impl Core {
         };
         let touched = !self.incoming.is_empty();
         // The learned part takes over some steps after a release; with a length of step of the scene's own it never does.
-        self.next_corrected = touched || (!learns && !corrected.own_pace) || self.loaded;
+        self.next_corrected = touched || (!learns && !corrected.alone()) || self.loaded;
         let load = self.loads.as_ref().and_then(|loads| loads.load());
         // A length of step of the scene's own may be short enough to need no substeps. Under a load that acts everywhere iterations are worth more.
         let in_parts = (corrected.free_substeps > 1 || !corrected.own_pace) && load.is_none();
@@ -60,6 +60,7 @@ impl Core {
             before: given.unwrap_or(&shared.before.field),
             still: given.is_some(),
             load,
+            way: [0.0, 1.0],
             enough: match load {
                 // What the whole body does settles later than an iteration's own step says.
                 // Whole modes know what it does.
@@ -94,7 +95,7 @@ impl Core {
             return true;
         };
         let lifted = corrected.most_substeps > 1 && self.driven && self.is_swung();
-        !(corrected.own_pace || lifted || self.loaded)
+        !(corrected.alone() || lifted || self.loaded)
     }
 
     /// Whether the last state is displaced by more than where the model's own free motion ends.

@@ -37,6 +37,8 @@ pub struct Corrector {
     pub time_step: Arc<TimeStep>,
     /// The scene has a length of step or a damping of its own.
     pub(super) own_pace: bool,
+    /// The tissue relaxes, which no learned map knows.
+    pub(super) relaxes: bool,
 }
 
 impl Corrector {
@@ -123,7 +125,7 @@ impl Corrector {
             false => Arc::clone(&corrections.time_step),
             true => Arc::new(corrections.time_step(
                 &model.mesh,
-                &model.manifest.material,
+                &model.manifest.step_material(),
                 integrator,
             )?),
         };
@@ -135,11 +137,13 @@ impl Corrector {
             time_step: &time_step,
             held: &corrections.body.held,
         };
+        let relaxes = !model.manifest.material.relaxation.is_empty();
         Ok(Some(Corrector {
             solver: memory::boxed(ImplicitSolver::new(context)?, WHAT)?,
             substeps: None,
             most_substeps,
-            free_substeps: own.free_substeps(integrator.step_s),
+            free_substeps: own.free_substeps(integrator.step_s, relaxes),
+            relaxes,
             substepper: None,
             most,
             target_mm,
@@ -175,6 +179,11 @@ impl Corrector {
         }
     }
 
+    /// Whether the elements make every step, those that nothing touches too.
+    pub(super) fn alone(&self) -> bool {
+        self.own_pace || self.relaxes
+    }
+
     /// Corrections that a step may get.
     pub(super) fn most(&self) -> u32 {
         self.most
@@ -199,8 +208,11 @@ impl Corrector {
         }
         let whole = self.time_step.integrator;
         let integrator = whole.over(whole.step_s / f64::from(count));
-        let time_step =
-            (context.corrections).time_step(&model.mesh, &model.manifest.material, integrator)?;
+        let time_step = (context.corrections).time_step(
+            &model.mesh,
+            &model.manifest.step_material(),
+            integrator,
+        )?;
         let substepper = Substepper::new(context, Arc::new(time_step), count)?;
         self.substepper = Some(memory::boxed(substepper, WHAT)?);
         Ok(())

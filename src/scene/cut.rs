@@ -322,7 +322,9 @@ impl Core {
             pairs: Vec::new(),
             local: Vec::new(),
             linearisation: Linearisation::default(),
+            relaxing: None,
         }))?;
+        self.take_stresses(before)?;
         let Some(problem) = &before.problem else {
             return Ok(());
         };

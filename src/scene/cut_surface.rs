@@ -170,7 +170,7 @@ impl Core {
             None => {
                 whole = self.whole_body()?;
                 if self.corrected.is_some() {
-                    let material = &self.model.manifest.material;
+                    let material = &self.model.manifest.step_material();
                     (self.model.corrections()?).prepare_cut(&self.mesh, material)?;
                 }
                 &whole

@@ -173,6 +173,7 @@ impl Core {
             before: &shared.before.field,
             still: false,
             load: self.loads.as_ref().and_then(|loads| loads.load()),
+            way: [0.0, 1.0],
             enough: corrected.enough(start),
         };
         let next = &mut self.next.field;

@@ -13,6 +13,7 @@ mod corrected;
 mod counters;
 mod cut;
 mod cut_state;
+mod cut_stresses;
 mod cut_surface;
 mod cutting;
 mod driven;

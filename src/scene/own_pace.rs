@@ -60,8 +60,8 @@ impl OwnPace {
     }
 
     /// Of how many shorter ones a free step is made.
-    pub fn free_substeps(self, step_s: f64) -> u32 {
-        match self.is_some() && step_s > LONGEST_SWING_S + 1e-9 {
+    pub fn free_substeps(self, step_s: f64, relaxes: bool) -> u32 {
+        match (self.is_some() || relaxes) && step_s > LONGEST_SWING_S + 1e-9 {
             true => 2,
             false => 1,
         }

@@ -72,7 +72,11 @@ impl Core {
     /// what is left is then that model's bias, not motion.
     fn is_still(&self, published: &RwLock<Published>) -> bool {
         let bias = self.model.manifest.rest_displacement_mm;
-        if self.counters.max_displacement > bias + STILL_DISPLACEMENT || self.engine.comes_to_rest()
+        // Tissue that relaxes creeps back slower than that.
+        let relaxes = self.corrected.as_ref().is_some_and(|own| own.relaxes);
+        if self.counters.max_displacement > bias + STILL_DISPLACEMENT
+            || self.engine.comes_to_rest()
+            || relaxes
         {
             return false;
         }

@@ -72,6 +72,24 @@ fn manifest_errors_name_the_field() {
         ),
         (
             "tiny-upt",
+            "/material/relaxation",
+            serde_json::json!([{"share": 0.6, "tau_s": 1}, {"share": 0.5, "tau_s": 9}]),
+            "material.relaxation",
+        ),
+        (
+            "tiny-upt",
+            "/material/relaxation",
+            serde_json::json!([{"share": 0.6, "tau_s": 0}]),
+            "material.relaxation[0].tau_s",
+        ),
+        (
+            "tiny-upt",
+            "/material/relaxation",
+            serde_json::json!([{"share": 0.6, "tau": 1}]),
+            "tau",
+        ),
+        (
+            "tiny-upt",
             "/precisions",
             serde_json::json!([]),
             "precisions",

@@ -2,6 +2,7 @@
 
 #[path = "../fixture/mod.rs"]
 mod fixture;
+mod relaxation;
 mod worker;
 
 use fixture::{BUNDLES, bits, largest_difference, model, plain, push, rollout, scene, sparse};

@@ -95,6 +95,7 @@ def requirements(manifest: dict) -> list[str]:
         "anchors": "anchors" in manifest.get("upt", {}),
         "corrections": "corrections" in manifest,
         "law": "law" in manifest.get("material", {}),
+        "relaxation": "relaxation" in manifest.get("material", {}),
         "release": "release" in manifest.get("prior", {}),
         "unlearned": manifest.get("kind") == "reduced" and "reduced" not in manifest,
         "vibration": "vibration" in manifest.get("prior", {}),

@@ -81,11 +81,11 @@ def evaluate_bundle(
 def check_tissue(own: dict, dataset: Dataset) -> None:
     """Refuses data of another tissue: errors on it say nothing about the bundle. Damping may differ (hard schemes)."""
     theirs = dataset.manifest.get("material", own)
-    for name in ("young_pa", "poisson", "density_kg_m3", "law"):
+    for name in ("young_pa", "poisson", "density_kg_m3", "law", "relaxation"):
         if own.get(name) != theirs.get(name):
             raise InputError(
                 f"{dataset.folder}: material.{name} is {theirs.get(name)}, the bundle is made for {own.get(name)}; "
-                "make the data with --young, --poisson, --density and --law of the bundle"
+                "make the data with --young, --poisson, --density, --law and --relaxation of the bundle"
             )
 
 

@@ -99,7 +99,7 @@ impl BundleFolder {
         let [own, theirs] = [&self.material, &case.material];
         (!is_one_tissue(own, theirs)).then(|| {
             format!(
-                "{name}: made for {}, but the cases have {}; simulate them with --young, --poisson, --density and --law",
+                "{name}: made for {}, but the cases have {}; simulate them with --young, --poisson, --density, --law and --relaxation",
                 tissue_of(own),
                 tissue_of(theirs)
             )
@@ -118,8 +118,12 @@ pub fn is_one_tissue(a: &Material, b: &Material) -> bool {
 
 fn tissue_of(material: &Material) -> String {
     let law = serde_json::to_string(&material.law).unwrap_or_default();
+    let relaxation = match material.relaxation.is_empty() {
+        true => String::new(),
+        false => format!(", relaxation {}", material.relaxation),
+    };
     format!(
-        "E = {} Pa, nu = {}, {} kg/m³, law {law}",
+        "E = {} Pa, nu = {}, {} kg/m³, law {law}{relaxation}",
         material.young_pa, material.poisson, material.density_kg_m3
     )
 }

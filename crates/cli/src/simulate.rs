@@ -113,6 +113,9 @@ pub struct SolverArguments {
     /// MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
     #[arg(long, default_value = "neo-hookean", value_parser = materials::law)]
     law: elements::Law,
+    /// Relaxation of the stress without change of volume: SHARE,TAU_S[,SHARE,TAU_S...], each share lost with its time constant, s. Default: none.
+    #[arg(long, default_value = "", hide_default_value = true, value_parser = materials::relaxation)]
+    relaxation: elements::Relaxation,
     /// Poisson's ratio.
     #[arg(long, default_value_t = 0.49)]
     poisson: f64,
@@ -144,6 +147,7 @@ impl SolverArguments {
         options.material.poisson = self.poisson;
         options.material = options.material.with_law(self.law);
         options.material.young_pa = self.young.unwrap_or(options.material.young_pa);
+        options.material.relaxation = self.relaxation;
         options.material.density_kg_m3 = self.density;
         options.material.damping_per_s = self.damping;
         if self.average_pressure {

@@ -17,7 +17,7 @@ pub const PADDING: u32 = u32::MAX;
 #[derive(Default)]
 pub struct Kind<const NODES: usize, const TETS: usize> {
     pub batches: Vec<Cluster<NODES, TETS>>,
-    /// A row a batch where the law takes displacements, else none.
+    /// A row a batch where the law takes displacements or the material relaxes, else none.
     pub gradients: Vec<Gradients<TETS>>,
     /// Mesh elements of each batch; [`PADDING`] in padding lanes.
     pub elements: Vec<[[u32; WIDTH]; TETS]>,
@@ -57,7 +57,8 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         let (groups, ends) = disjoint_batches(groups)?;
         self.batches.try_reserve(ends.len())?;
         self.elements.try_reserve(ends.len())?;
-        let displacements = source.material.law.takes_displacements();
+        let relaxes = !source.material.relaxation.is_empty();
+        let displacements = relaxes || source.material.law.takes_displacements();
         if displacements {
             self.gradients.try_reserve(ends.len())?;
         }

@@ -125,6 +125,7 @@ impl Partition {
             });
         }
         let mut copy = Partition::empty(self.moduli);
+        copy.relaxation = self.relaxation;
         copy.chunks = chunks;
         copy.octahedra = self.octahedra.copied()?;
         copy.pairs = self.pairs.copied()?;

@@ -6,14 +6,19 @@
 
 use crate::kernel::{
     LaneTerms, Shape, add_forces, add_forces_of_stretches, add_volumes, add_volumes_of_stretches,
+    relax,
 };
 use crate::laws::{Isochoric, Law};
 use crate::partition::{Chunk, Partition};
 use crate::slots::{advance, place};
-use lanes::{Isa, NodeLanes};
+use crate::stress_step::{SIX, StressStep};
+use lanes::{Isa, NodeLanes, WIDTH};
 
 type ForceKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]) -> f32;
 type VolumeKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]);
+/// Displacements by slot, and two rows of forces of which the second may be null.
+type RelaxKernel =
+    unsafe fn(&Partition, &Chunk, &StressStep, [*mut f32; 3], *const [f32; 4], [*mut [f32; 4]; 2]);
 type PlaceKernel = unsafe fn(usize, *const [f32; 4], *const [f32; 4], *mut [f32; 4]);
 type AdvanceKernel = unsafe fn(usize, f32, *const [f32; 4], *mut [f32; 4], *mut [f32; 4]);
 
@@ -23,6 +28,8 @@ pub struct Kernels {
     pub forces: ForceKernel,
     pub averaged_forces: ForceKernel,
     pub volumes: VolumeKernel,
+    /// Takes a state into what a chunk's elements remember of their stresses ([`crate::StressHistory::pointers`]), and adds what that pushes with.
+    pub relax: RelaxKernel,
     pub place: PlaceKernel,
     pub advance: AdvanceKernel,
 }
@@ -116,6 +123,32 @@ unsafe fn all_volumes<L: NodeLanes>(
     }
 }
 
+/// What the elements of a chunk remember goes on, and pushes.
+#[inline(always)]
+unsafe fn all_histories<L: NodeLanes>(
+    partition: &Partition,
+    chunk: &Chunk,
+    step: &StressStep,
+    [of_octahedra, of_pairs, of_singles]: [*mut f32; 3],
+    nodes: *const [f32; 4],
+    forces: [*mut [f32; 4]; 2],
+) {
+    unsafe {
+        let moduli = partition.moduli;
+        let shear = moduli.shear_pa * step.stiffer;
+        let law = &LaneTerms::new(&moduli.law, [shear, moduli.bulk_pa]);
+        let (octahedra, pairs, singles) = partition.clusters(chunk);
+        let (a, b, c) = partition.gradients(chunk);
+        let batch = (step.count + 1) * SIX * WIDTH;
+        let of_octahedra = of_octahedra.add(chunk.octahedra.start * 4 * batch);
+        let of_pairs = of_pairs.add(chunk.pairs.start * 2 * batch);
+        let of_singles = of_singles.add(chunk.singles.start * batch);
+        relax::<L, 6, 4>(law, step, (octahedra, a), of_octahedra, nodes, forces);
+        relax::<L, 5, 2>(law, step, (pairs, b), of_pairs, nodes, forces);
+        relax::<L, 4, 1>(law, step, (singles, c), of_singles, nodes, forces);
+    }
+}
+
 /// Compiles the kernels for one `Lanes` type under the given target features.
 macro_rules! kernels {
     ($module:ident, $lanes:ty $(, $feature:literal)?) => {
@@ -153,6 +186,18 @@ macro_rules! kernels {
             }
 
             $(#[target_feature(enable = $feature)])?
+            unsafe fn histories(
+                p: &Partition,
+                chunk: &Chunk,
+                step: &StressStep,
+                values: [*mut f32; 3],
+                n: *const [f32; 4],
+                f: [*mut [f32; 4]; 2],
+            ) {
+                unsafe { all_histories::<$lanes>(p, chunk, step, values, n, f) }
+            }
+
+            $(#[target_feature(enable = $feature)])?
             unsafe fn place_nodes(
                 count: usize,
                 rest: *const [f32; 4],
@@ -177,6 +222,7 @@ macro_rules! kernels {
                 forces,
                 averaged_forces,
                 volumes,
+                relax: histories,
                 place: place_nodes,
                 advance: advance_nodes,
             };

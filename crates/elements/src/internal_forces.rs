@@ -55,14 +55,14 @@ impl Scratch {
 }
 
 /// A pointer that the tasks of one evaluation share.
-struct Shared<T>(*mut T);
+pub(crate) struct Shared<T>(pub(crate) *mut T);
 // SAFETY: the tasks touch disjoint parts (see `evaluate`).
 unsafe impl<T> Send for Shared<T> {}
 // SAFETY: as above.
 unsafe impl<T> Sync for Shared<T> {}
 
 impl<T> Shared<T> {
-    fn at(&self, index: usize) -> *mut T {
+    pub(crate) fn at(&self, index: usize) -> *mut T {
         self.0.wrapping_add(index)
     }
 }

@@ -29,6 +29,7 @@
 mod forces;
 mod gradients;
 mod moduli;
+mod relax;
 mod shape;
 mod stretches;
 
@@ -38,6 +39,7 @@ use forces::scatter;
 pub use gradients::{add_forces_of_stretches, add_volumes_of_stretches};
 use lanes::{NodeLanes, WIDTH, prefetch};
 use moduli::moduli;
+pub use relax::relax;
 pub use shape::Shape;
 use shape::{cross, dot, edges, load, shape};
 pub use stretches::LaneTerms;

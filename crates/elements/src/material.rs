@@ -2,6 +2,7 @@
 
 use crate::fault::MaterialError;
 use crate::laws::Law;
+use crate::relaxation::Relaxation;
 use serde::{Deserialize, Serialize};
 
 /// Elastic constants, density and damping.
@@ -18,6 +19,9 @@ pub struct Material {
     /// Left out of files where it is neo-Hookean.
     #[serde(default, skip_serializing_if = "Law::is_default")]
     pub law: Law,
+    /// Left out of files where the tissue is elastic.
+    #[serde(default, skip_serializing_if = "Relaxation::is_empty")]
+    pub relaxation: Relaxation,
 }
 
 impl Default for Material {
@@ -29,6 +33,7 @@ impl Default for Material {
             density_kg_m3: 1000.0,
             damping_per_s: 20.0,
             law: Law::default(),
+            relaxation: Relaxation::default(),
         }
     }
 }
@@ -53,6 +58,22 @@ impl Material {
         Self {
             young_pa: law.young_pa(self.poisson).unwrap_or(self.young_pa),
             law,
+            ..self
+        }
+    }
+
+    /// The same as steps of `h` seconds see it: with `g(h)` of its relaxation on the shear modulus, and the same bulk modulus. Itself where it is elastic.
+    pub fn in_steps_of(self, h: f64) -> Self {
+        if self.relaxation.is_empty() {
+            return self;
+        }
+        let part = self.relaxation.over(h);
+        let (shear, bulk) = (part * self.shear_pa(), self.bulk_pa());
+        let both = 3.0 * bulk + shear;
+        Self {
+            young_pa: 9.0 * bulk * shear / both,
+            poisson: (1.5 * bulk - shear) / both,
+            law: self.law.times(part),
             ..self
         }
     }
@@ -105,7 +126,7 @@ impl Material {
         if !(0.0..=1e6).contains(&self.damping_per_s) {
             return fail("damping_per_s", self.damping_per_s, "in [0, 1e6] 1/s");
         }
-        if let Some(fault) = self.law.fault() {
+        if let Some(fault) = self.law.fault().or_else(|| self.relaxation.fault()) {
             return Err(fault);
         }
         match self.law.young_pa(self.poisson) {

@@ -11,6 +11,7 @@ use crate::batches::{Element, Kind, PADDING, Source};
 use crate::cluster::{Groups, Octahedra, Pairs, Singles};
 use crate::gradients::Gradients;
 use crate::material::{Material, Moduli};
+use crate::relaxation::Relaxation;
 use crate::room::{collected, filled, room};
 use crate::slots::PADDED;
 use crate::tetrahedra::Tetrahedra;
@@ -63,6 +64,8 @@ pub struct Partition {
     zeros: Vec<[f32; 4]>,
     /// The material's.
     pub moduli: Moduli,
+    /// The material's.
+    pub relaxation: Relaxation,
 }
 
 impl Partition {
@@ -118,6 +121,7 @@ impl Partition {
             rest: Vec::new(),
             zeros: Vec::new(),
             moduli: material.moduli(),
+            relaxation: material.relaxation,
         };
         for (chunk, leaf) in leaves().enumerate() {
             let is_own = |node: u32| owner[node as usize] == chunk as u32;
@@ -156,6 +160,7 @@ impl Partition {
             rest: Vec::new(),
             zeros: Vec::new(),
             moduli,
+            relaxation: Relaxation::default(),
         }
     }
 
@@ -226,10 +231,10 @@ impl Partition {
         )
     }
 
-    /// The gradients of a chunk's batches; empty where the law takes positions.
+    /// The gradients of a chunk's batches; empty where the law takes positions and the material does not relax.
     #[inline(always)]
     pub fn gradients(&self, chunk: &Chunk) -> (&[Gradients<4>], &[Gradients<2>], &[Gradients<1>]) {
-        if self.zeros.is_empty() {
+        if !self.moduli.law.takes_displacements() && self.relaxation.is_empty() {
             return (&[], &[], &[]);
         }
         (

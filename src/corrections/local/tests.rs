@@ -62,6 +62,7 @@ impl Bench {
             before: &self.zero,
             still: false,
             load: None,
+            way: [0.0, 1.0],
             enough: Enough {
                 iterations: 3,
                 error_mm: 0.0,

@@ -82,10 +82,10 @@ impl Core {
     pub(super) fn most_bytes(&self) -> usize {
         let count = self.mesh.node_count();
         // Three velocities, contact forces, pairs; of local ones six fields, and numbers of chunks and modes.
-        let history = self
-            .corrected
-            .as_ref()
-            .map(|_| (4 + 8 * PAIRS) * 12 * count + PAIRS * 16384);
+        let history = self.corrected.as_ref().map(|corrected| {
+            let stresses = corrected.solver.remembered_bytes();
+            (4 + 8 * PAIRS) * 12 * count + PAIRS * 16384 + stresses
+        });
         let (contacts, fields) = (2 * 16 * count, 2 * 12 * count);
         let rest = history.unwrap_or(0) + self.tool_bytes() + self.load_bytes() + 2048;
         self.engine.record_bytes() + contacts + fields + rest
@@ -112,7 +112,10 @@ impl Core {
         contact_before.admit(count)?;
         self.engine.admit(records)?;
         match (&history, &self.corrected) {
-            (Some(history), Some(_)) => history.check(3 * count, contact.len())?,
+            (Some(history), Some(corrected)) => {
+                history.check(3 * count, contact.len())?;
+                corrected.solver.admit(history)?;
+            }
             (None, None) => {}
             (Some(_), None) | (None, Some(_)) => {
                 return Err(Error::Snapshot(

@@ -36,6 +36,8 @@ pub struct Workbench {
     pub mesh: Mesh,
     pub boundary: Boundary,
     pub material: Material,
+    /// The same as the bundle's steps see it, where it relaxes.
+    pub stepped: Material,
     pub prior: PriorTable,
     pub stiffness: Stiffness,
     pub factor: Factor,
@@ -71,7 +73,8 @@ impl Workbench {
         let mesh = Mesh::read(&file_of(bundle, stated.body.as_deref(), &stated.mesh.file))?;
         let held = mesh.held_nodes(boundary);
         let material = stated.material;
-        let lame = Lame::from_young(material.young_pa, material.poisson)?;
+        let stepped = stated.step_material();
+        let lame = Lame::from_young(stepped.young_pa, stepped.poisson)?;
 
         let bar = spinner(quiet, "factorisation");
         let stiffness = Stiffness::assemble(&mesh, &held, lame)?;
@@ -95,7 +98,7 @@ impl Workbench {
         let runtime_mesh =
             upt::bundle::Mesh::parse(&files.tensors(&stated.mesh.file)?, stated.boundary)?;
         let prior = PriorTable::open(&files, entry, &runtime_mesh)?;
-        let (young, poisson) = (material.young_pa, material.poisson);
+        let (young, poisson) = (stepped.young_pa, stepped.poisson);
         let open = |path| ColumnsFile::open(path, &mesh, boundary, young, poisson);
         let columns = known.columns.map(open).transpose()?;
         let mut held_flags = vec![false; mesh.node_count()];
@@ -104,6 +107,7 @@ impl Workbench {
         Ok(Self {
             boundary,
             material,
+            stepped,
             prior,
             stiffness,
             factor,
@@ -148,7 +152,7 @@ impl Workbench {
     }
 
     pub fn element_forces(&self) -> Result<ElementForces> {
-        let made = ElementForces::new(self.mesh.tetrahedra(), &self.material, Isa::detect());
+        let made = ElementForces::new(self.mesh.tetrahedra(), &self.stepped, Isa::detect());
         Ok(made?)
     }
 

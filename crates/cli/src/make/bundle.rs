@@ -77,6 +77,9 @@ pub fn assemble(
     if !material.law.is_default() {
         requires.insert(0, "law");
     }
+    if !material.relaxation.is_empty() {
+        requires.insert(0, "relaxation");
+    }
     let rounded = |x: f64| (x * 1000.0).round() / 1000.0;
     let blank = "0".repeat(64);
     let entries = [

@@ -68,6 +68,9 @@ pub fn write(options: &Options, cluster: &str, folder: &Path) -> Result<PathBuf>
             .flat_map(|(name, value)| [(*name).to_owned(), value.to_string()]),
     );
     simulate.extend(["--law".to_owned(), material.law.to_string()]);
+    if !material.relaxation.is_empty() {
+        simulate.extend(["--relaxation".to_owned(), material.relaxation.to_string()]);
+    }
     let train: Vec<String> = [
         "python",
         "-m",

@@ -105,6 +105,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     fit?;
 
     let material = options.material()?;
+    // The tables answer within a step.
+    let stepped = material.in_steps_of(tissue::schemes::FRAME_S);
     let held_key = key_of(&[
         body.key.as_bytes(),
         mesh.hash().as_bytes(),
@@ -113,8 +115,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             .iter()
             .flat_map(|row| row.to_le_bytes())
             .collect::<Vec<u8>>(),
-        material.young_pa.to_string().as_bytes(),
-        material.poisson.to_string().as_bytes(),
+        stepped.young_pa.to_string().as_bytes(),
+        stepped.poisson.to_string().as_bytes(),
         options.boundary.as_str().as_bytes(),
     ]);
     let columns_file = work.file("columns.safetensors");
@@ -125,8 +127,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
                 mesh: mesh_file.clone(),
                 boundary: options.boundary,
                 out: columns_file.clone(),
-                young: material.young_pa,
-                poisson: material.poisson,
+                young: stepped.young_pa,
+                poisson: stepped.poisson,
                 batch: 96,
                 threads: options.threads,
                 json: options.json,
@@ -153,8 +155,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             boundary: options.boundary,
             count: vibration::count(&mesh, options),
             out: modes_file.clone(),
-            young: material.young_pa,
-            poisson: material.poisson,
+            young: stepped.young_pa,
+            poisson: stepped.poisson,
             density: material.density_kg_m3,
             threads: options.threads,
             json: options.json,
@@ -184,8 +186,8 @@ pub fn run(options: &Options) -> Result<ExitCode> {
             &columns_file,
             &mesh,
             options.boundary,
-            material.young_pa,
-            material.poisson,
+            stepped.young_pa,
+            stepped.poisson,
         )?;
         let modes = vibration::Modes::read(&modes_file)?;
         tables::make(options, &mesh, &columns, &modes, &sizes, &clock, stage)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::fixed::Fixed;
 use anyhow::{Result, bail};
 use clap::Args;
-use elements::{Law, Material};
+use elements::{Law, Material, Relaxation};
 use serde_json::{Value, json};
 use tissue::mesh::{Boundary, Mesh, face_area};
 use tissue::mesh_import::Region;
@@ -61,12 +61,10 @@ pub struct Options {
     /// Node sets of a mesh file that are held: `fixed`, or `supported` (both sets; not together with --fixed).
     #[arg(long, default_value = "fixed")]
     pub boundary: Boundary,
-    /// Region of the surface that instruments may touch. May be repeated. Default: what the mesh file names, otherwise all of the surface
-    /// except a rim around what is held.
+    /// Region of the surface that instruments may touch. May be repeated. Default: what the mesh file names, otherwise all of the surface except a rim around what is held.
     #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
     pub domain: Vec<Region>,
-    /// Region of another stiffness: a region, `=` and a factor on Young's modulus, such as group:tumour=4 or inside:tumour.stl=4. May be
-    /// repeated; where regions overlap, the last one counts.
+    /// Region of another stiffness: a region, `=` and a factor on Young's modulus, such as group:tumour=4 or inside:tumour.stl=4. May be repeated; where regions overlap, the last one counts.
     #[arg(long, value_name = "REGION=FACTOR", allow_hyphen_values = true, value_parser = stiffer)]
     pub stiffness: Vec<(Region, f32)>,
     /// Number of nodes to aim for when a surface is filled.
@@ -92,6 +90,9 @@ pub struct Options {
     /// MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
     #[arg(long, default_value = "neo-hookean", value_parser = materials::law)]
     pub law: Law,
+    /// Relaxation of the stress without change of volume: SHARE,TAU_S[,SHARE,TAU_S...], each share lost with its time constant, s. Default: none.
+    #[arg(long, default_value = "", hide_default_value = true, value_parser = materials::relaxation)]
+    pub relaxation: Relaxation,
     /// Poisson's ratio, below 0.5.
     #[arg(long, default_value_t = 0.49)]
     pub poisson: f64,
@@ -235,20 +236,19 @@ impl Options {
             density_kg_m3: self.density.unwrap_or(density),
             damping_per_s: self.damping.unwrap_or(damping),
             law: Law::default(),
+            relaxation: self.relaxation,
         }
         .with_law(self.law);
-        Ok(Material {
-            young_pa: self.young.unwrap_or(own.young_pa),
-            ..own
-        })
+        let young_pa = self.young.unwrap_or(own.young_pa);
+        Ok(Material { young_pa, ..own })
     }
 
     /// The programmes of `--tools`.
     pub fn programmes(&self) -> Result<Vec<ToolProgramme>> {
-        let list = self.tools.as_deref().map(ToolProgramme::parse_list);
-        list.transpose()
-            .map(Option::unwrap_or_default)
-            .map_err(|error| anyhow::anyhow!("--tools: {error}"))
+        match self.tools.as_deref().map(ToolProgramme::parse_list) {
+            None => Ok(Vec::new()),
+            Some(list) => list.map_err(|error| anyhow::anyhow!("--tools: {error}")),
+        }
     }
 
     /// Where stages are kept.
@@ -298,7 +298,7 @@ impl Options {
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
             "boundary": self.boundary.as_str(), "fixed": self.fixed.iter().map(Fixed::to_string).collect::<Vec<String>>(), "domain": list(&self.domain), "nodes": self.nodes,
             "part": self.part, "label": self.label, "refill": self.refill,
-            "material": self.material, "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
+            "material": self.material, "relaxation": self.relaxation.to_string(), "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,
         })
     }

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::Args;
-use elements::Law;
+use elements::{Law, Relaxation};
 use serde_json::json;
 
 /// `name, tissue, law, data, doi, source`, with a head line.
@@ -56,6 +56,14 @@ pub fn tissues() -> Vec<Tissue<'static>> {
             })
         })
         .collect()
+}
+
+/// A Prony series, or none; what clap calls for `--relaxation`.
+pub fn relaxation(text: &str) -> Result<Relaxation, String> {
+    match text.is_empty() {
+        true => Ok(Relaxation::default()),
+        false => Relaxation::parse(text),
+    }
 }
 
 /// A law by its formula or by the name of a tissue; what clap calls for `--law`.

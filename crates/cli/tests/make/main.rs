@@ -3,6 +3,7 @@
 mod defaults;
 mod interrupted;
 mod refused;
+mod relaxing;
 mod short_time;
 
 use std::path::Path;
@@ -206,11 +207,12 @@ fn a_small_organ_end_to_end_and_checked_again() {
 }
 
 #[test]
-fn an_organ_of_another_law_is_corrected_by_that_law() {
+fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
     let folder = tempfile::tempdir().unwrap();
     let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
     plain(&surface);
-    let asked = ["--law", "mooney-rivlin:1", "--tools", "press,lift"];
+    let law = ["--law", "mooney-rivlin:1", "--relaxation", "0.3,0.1,0.3,1"];
+    let asked = [&law[..], &["--tools", "press,lift"]].concat();
     let output = command(&surface, &out, &[&HELD[..], &asked].concat())
         .output()
         .unwrap();
@@ -223,7 +225,10 @@ fn an_organ_of_another_law_is_corrected_by_that_law() {
     let law = serde_json::json!({"name": "mooney-rivlin", "c01_share": 1.0});
     assert_eq!(manifest["material"]["law"], law);
     let requires = manifest["requires"].as_array().unwrap();
-    assert!(requires.iter().any(|name| name == "law"), "{requires:?}");
+    for part in ["law", "relaxation"] {
+        assert!(requires.iter().any(|name| name == part), "{requires:?}");
+    }
+    relaxing::falls_as_the_solvers(&out);
     // Measured against the reference solver with the same law.
     let certificate = read("certificate.json");
     let share = certificate["contact"]["share_of_linear"].as_f64().unwrap();

@@ -15,7 +15,7 @@ const LEAST_DET: f32 = crate::tetrahedron::LEAST_DET as f32;
 
 /// `H` of one tetrahedron, rows, from the differences of its corners' displacements.
 #[inline(always)]
-unsafe fn gradient<L: NodeLanes>(
+pub(super) unsafe fn gradient<L: NodeLanes>(
     rows: &[[f32; WIDTH]; 9],
     first: usize,
     edge: [[L; 3]; 3],
@@ -38,7 +38,7 @@ unsafe fn gradient<L: NodeLanes>(
 
 /// `cof F` and `J - 1` of `F = 1 + H`: `cof F = 1 + tr H - H^T + cof H`, `J - 1 = tr H + tr cof H + det H`.
 #[inline(always)]
-unsafe fn volume<L: NodeLanes>(h: &[[L; 3]; 3]) -> ([[L; 3]; 3], L) {
+pub(super) unsafe fn volume<L: NodeLanes>(h: &[[L; 3]; 3]) -> ([[L; 3]; 3], L) {
     unsafe {
         let mut cofactor = [[h[0][0]; 3]; 3];
         for i in 0..3 {
@@ -64,7 +64,7 @@ unsafe fn volume<L: NodeLanes>(h: &[[L; 3]; 3]) -> ([[L; 3]; 3], L) {
 
 /// The differences of the displacements of a tetrahedron's corners.
 #[inline(always)]
-unsafe fn of_corners<L: NodeLanes, const NODES: usize>(
+pub(super) unsafe fn of_corners<L: NodeLanes, const NODES: usize>(
     tet: usize,
     edge: &[[L; 3]; NODES],
 ) -> [[L; 3]; 3] {

@@ -108,7 +108,7 @@ impl<L: NodeLanes> Strain<L> {
 
 /// The product of two symmetric matrices that commute.
 #[inline(always)]
-unsafe fn product<L: NodeLanes>(a: &[L; 6], b: &[L; 6]) -> [L; 6] {
+pub(super) unsafe fn product<L: NodeLanes>(a: &[L; 6], b: &[L; 6]) -> [L; 6] {
     unsafe {
         [
             a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0]))),

@@ -86,6 +86,14 @@ impl Law {
         }
     }
 
+    /// With a shear modulus of its own: `part` of it.
+    pub(crate) fn times(self, part: f64) -> Self {
+        match self {
+            Self::NeoHookean(_) | Self::MooneyRivlin(_) => self,
+            Self::Ogden(law) => Self::Ogden(law.times(part)),
+        }
+    }
+
     /// The constant that is not admitted.
     pub(crate) fn fault(&self) -> Option<MaterialError> {
         match self {

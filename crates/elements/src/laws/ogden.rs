@@ -53,6 +53,17 @@ impl Ogden {
         0.5 * products.sum::<f64>()
     }
 
+    /// The same with `part` of its shear modulus.
+    pub(super) fn times(&self, part: f64) -> Self {
+        let scaled = |term: &Term| Term {
+            mu_pa: part * term.mu_pa,
+            ..*term
+        };
+        Self {
+            terms: Terms::new(self.terms.iter().map(scaled)).unwrap_or_default(),
+        }
+    }
+
     /// `sum mu (phi(alpha s) - 1)`, Pa: a principal Cauchy stress but for a pressure, at the logarithm `s` of a stretch without change of
     /// volume. `phi` is the exponential up to `CAP`, then its tangent.
     pub fn pull(&self, s: f64) -> f64 {

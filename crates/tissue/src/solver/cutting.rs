@@ -5,9 +5,10 @@
 
 use super::fields::Node;
 use super::parts::Parts;
+use super::relaxing::Relaxing;
 use super::{Solver, SolverError};
 use contact::{SPACING_MM, Samples};
-use elements::{PADDING, Tetrahedra};
+use elements::{PADDING, Partition, Tetrahedra};
 use std::sync::Arc;
 use topology::{Blade, Body, Change, Fragment, Point, RestMesh, Sweep, TopologyError};
 
@@ -134,10 +135,11 @@ impl Solver {
         let positions: Vec<[f32; 3]> = (0..body.node_count() as u32)
             .map(|node| self.positions[body.parent(node) as usize])
             .collect();
-        let (mut tets, mut shares) = (Vec::new(), Vec::new());
+        let (mut tets, mut shares, mut parents) = (Vec::new(), Vec::new(), Vec::new());
         let mut stiffness = Vec::new();
         for element in body.elements() {
             tets.push(element.nodes);
+            parents.push(element.parent);
             shares.push(element.share as f32);
             let own = self.topology.stiffness.get(element.parent as usize);
             stiffness.push(own.copied().unwrap_or(1.0) * element.stiffness);
@@ -172,7 +174,10 @@ impl Solver {
                 fields.increment[slot as usize] = self.fields.increment[from];
             }
         }
+        let relaxing = self.follow_relaxing(&parts.partition, &parents)?;
         self.partition = parts.partition;
+        self.relaxing_backup.clone_from(&relaxing);
+        self.relaxing = relaxing;
         self.mass = parts.mass;
         self.rest_volume = parts.rest_volume;
         self.speed_squared = parts.speed_squared;
@@ -196,6 +201,27 @@ impl Solver {
         self.critical_now =
             self.critical_at_rest * (self.bound_at_rest / self.diagnose().largest_bound).sqrt();
         Ok(change)
+    }
+
+    /// What relaxing elements of the body's new packing remember, which stem from the mesh elements `parents`.
+    fn follow_relaxing(
+        &self,
+        partition: &Partition,
+        parents: &[u32],
+    ) -> Result<Option<Relaxing>, SolverError> {
+        let Some(before) = &self.relaxing else {
+            return Ok(None);
+        };
+        let from_parents: Vec<u32> = match &self.topology.body {
+            Some(body) => body.elements().map(|element| element.parent).collect(),
+            None => (0..self.tets.len() as u32).collect(),
+        };
+        let mut after = Relaxing::new(partition)?;
+        if let Some(after) = &mut after {
+            let source = (&self.partition, before);
+            after.follow(partition, source, [parents, &from_parents])?;
+        }
+        Ok(after)
     }
 
     /// Held nodes with their copies, ascending: a copy of a held node is held.

@@ -80,14 +80,20 @@ impl Solver {
         let mut touch = self.touch.take();
         let mut load = self.load.take();
         let mut ties = self.ties.take();
+        let mut relaxing = self.relaxing.take();
         let mut march = self.marcher(steps);
         march.touch = touch.as_mut().map(Mutex::new);
         march.load = load.as_mut().map(Mutex::new);
         march.ties = ties.as_mut().map(Mutex::new);
+        march.relaxing = relaxing.as_mut().map(Mutex::new);
         let tallies = march.run(&mut fields, self.pool.as_ref());
         self.touch = touch;
         self.load = load;
         self.ties = ties;
+        if let Some(relaxing) = &mut relaxing {
+            relaxing.passed(steps, self.dt);
+        }
+        self.relaxing = relaxing;
         self.fields = fields;
         tallies
     }
@@ -107,6 +113,7 @@ impl Solver {
             touch: None,
             load: None,
             ties: None,
+            relaxing: None,
             steps,
         }
     }
@@ -114,7 +121,11 @@ impl Solver {
     /// Internal forces of the present state into `fields.force`.
     pub(super) fn update_forces(&mut self) {
         let mut fields = std::mem::take(&mut self.fields);
-        self.marcher(0).forces(&mut fields, self.pool.as_ref());
+        let mut relaxing = self.relaxing.take();
+        let mut march = self.marcher(0);
+        march.relaxing = relaxing.as_mut().map(Mutex::new);
+        march.forces(&mut fields, self.pool.as_ref());
+        self.relaxing = relaxing;
         self.fields = fields;
     }
 

@@ -10,6 +10,7 @@
 use super::barrier::SpinBarrier;
 use super::body_load::{self, BodyLoad};
 use super::fields::{Fields, Node};
+use super::relaxing::{Relaxing, View};
 use super::ties::Ties;
 use super::touch::Touch;
 use elements::PADDED;
@@ -55,6 +56,8 @@ pub(crate) struct March<'a> {
     pub load: Option<Mutex<&'a mut BodyLoad>>,
     /// Ties, resolved before the tools by the same thread.
     pub ties: Option<Mutex<&'a mut Ties>>,
+    /// What relaxing tissue remembers.
+    pub relaxing: Option<Mutex<&'a mut Relaxing>>,
     pub steps: u32,
 }
 
@@ -73,6 +76,7 @@ pub(super) struct Shared {
     pub force: *mut Node,
     /// Loads of the inner step; null where there are none.
     load: *const Node,
+    pub(super) relaxing: Option<View>,
     pub tallies: *mut Tally,
 }
 
@@ -83,6 +87,7 @@ impl Shared {
             increment: fields.increment.as_mut_ptr(),
             force: fields.force.as_mut_ptr(),
             load: std::ptr::null(),
+            relaxing: None,
             tallies: tallies.as_mut_ptr(),
         }
     }
@@ -101,11 +106,13 @@ impl March<'_> {
         if let Some(Ok(load)) = self.load.as_ref().map(Mutex::lock) {
             shared.load = load.now.as_ptr();
         }
+        shared.relaxing = self.relaxing_view();
         self.on_threads(pool, |first, mine, barrier| {
             let mut positions = self.positions();
             for step in 1..=self.steps {
                 // SAFETY: phases and barriers as `Shared` demands; `mine` is disjoint a thread.
                 unsafe {
+                    self.remember(shared, mine.clone(), &mut positions, step);
                     self.element_phase(shared, mine.clone(), barrier, &mut positions, step);
                     barrier.wait();
                     if let Some(load) = &self.load {
@@ -134,7 +141,8 @@ impl March<'_> {
     /// Computes the forces of the present state into `fields.force` (owned slots complete).
     pub fn forces(&self, fields: &mut Fields, pool: Option<&ThreadPool>) {
         let mut tallies = vec![Tally::default(); self.partition.chunks.len()];
-        let shared = Shared::new(fields, &mut tallies);
+        let mut shared = Shared::new(fields, &mut tallies);
+        shared.relaxing = self.relaxing_view();
         self.on_threads(pool, |_, mine, barrier| {
             let mut positions = self.positions();
             // SAFETY: as in `run`.
@@ -142,7 +150,11 @@ impl March<'_> {
                 self.element_phase(shared, mine.clone(), barrier, &mut positions, 1);
                 barrier.wait();
                 for chunk in mine {
-                    self.collect(shared, &self.partition.chunks[chunk]);
+                    let chunk = &self.partition.chunks[chunk];
+                    self.collect(shared, chunk);
+                    if let Some(relaxing) = &shared.relaxing {
+                        relaxing.add(chunk, shared.force);
+                    }
                 }
             }
         });
@@ -295,6 +307,12 @@ impl March<'_> {
                 .partition_point(|path| (path.slot as usize) < own.end);
             let paths = &self.paths[first..last];
             let tally = &mut *shared.tallies.add(index);
+            if let Some(relaxing) = &shared.relaxing {
+                if relaxing.is_due(step) {
+                    relaxing.collect(chunk);
+                }
+                relaxing.add(chunk, shared.force);
+            }
             if !shared.load.is_null() {
                 body_load::add(shared.load, shared.force, own.clone());
                 tally.work += body_load::half_work(shared.load, shared.increment, own.clone());

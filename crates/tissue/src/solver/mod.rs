@@ -10,6 +10,7 @@
 
 mod barrier;
 mod body_load;
+mod cost;
 mod cut_body;
 mod cutting;
 mod diagnosis;
@@ -22,6 +23,8 @@ mod march;
 mod mass;
 mod options;
 mod parts;
+mod relaxing;
+mod remember;
 mod stability;
 mod stiffest;
 mod support;
@@ -34,6 +37,7 @@ mod tying;
 mod tests;
 
 pub use body_load::{Loads, SurfacePressure};
+pub use cost::StepCost;
 pub use error::SolverError;
 pub use lanes::Isa;
 pub use options::{Pressure, SolverOptions, Substep};
@@ -49,6 +53,7 @@ use fields::{Fields, Node};
 use march::Path;
 use options::check_positive;
 use parts::Parts;
+use relaxing::Relaxing;
 use ties::Ties;
 use touch::Touch;
 
@@ -117,6 +122,8 @@ pub struct Solver {
     load: Option<BodyLoad>,
     ties: Option<Ties>,
     ties_backup: Option<Ties>,
+    relaxing: Option<Relaxing>,
+    relaxing_backup: Option<Relaxing>,
     paths: Vec<Path>,
     pool: Option<rayon::ThreadPool>,
     /// Inner step that the increments in `fields` belong to, s.
@@ -156,6 +163,7 @@ impl Solver {
         };
         let held_nodes = mesh.held_nodes(boundary);
         let parts = Parts::new(mesh.tetrahedra(), &[], &held_nodes, &options)?;
+        let relaxing = Relaxing::new(&parts.partition)?;
         let slots = parts.partition.node_of_slot.len();
         let zero = vec![Node::default(); slots];
         let fields = Fields {
@@ -181,6 +189,8 @@ impl Solver {
             load: None,
             ties: None,
             ties_backup: None,
+            relaxing_backup: relaxing.clone(),
+            relaxing,
             fields,
             paths: Vec::new(),
             pool,
@@ -212,6 +222,9 @@ impl Solver {
         self.touch = None;
         self.load = None;
         self.ties = None;
+        if let Some(relaxing) = &mut self.relaxing {
+            relaxing.clear();
+        }
         self.dt = self.options.inner_step_s;
         self.time_s = 0.0;
         self.external_work = 0.0;
@@ -261,6 +274,7 @@ impl Solver {
         self.backup_dt = self.dt;
         self.touch_backup.clone_from(&self.touch);
         self.ties_backup.clone_from(&self.ties);
+        self.relaxing_backup.clone_from(&self.relaxing);
         let paths_before = std::mem::take(&mut self.paths);
         let mut refinements = 0;
         loop {
@@ -281,6 +295,7 @@ impl Solver {
                     self.fields.clone_from(&self.backup);
                     self.touch.clone_from(&self.touch_backup);
                     self.ties.clone_from(&self.ties_backup);
+                    self.relaxing.clone_from(&self.relaxing_backup);
                     self.dt = self.backup_dt;
                     if self.options.substep == Substep::Refuse || refinements == MAX_REFINEMENTS {
                         self.paths = paths_before;
@@ -322,34 +337,6 @@ impl Solver {
         self.time_s
     }
 
-    /// Bytes that an inner step streams through, and its floating-point operations:
-    /// the figures behind the roofline in `docs/reference/solver.md`.
-    pub fn step_cost(&self) -> StepCost {
-        let partition = &self.partition;
-        let slots: usize = partition.chunks.iter().map(|c| c.slot_count()).sum();
-        let (octahedra, pairs, singles) =
-            (&partition.octahedra, &partition.pairs, &partition.singles);
-        let kinds = [
-            (6, 4, octahedra.count(), octahedra.batches.len()),
-            (5, 2, pairs.count(), pairs.batches.len()),
-            (4, 1, singles.count(), singles.batches.len()),
-        ];
-        let mut cost = StepCost {
-            // Displacement, increment and force both ways, rest positions.
-            bytes: slots * 7 * std::mem::size_of::<Node>()
-                + octahedra.bytes()
-                + pairs.bytes()
-                + singles.bytes(),
-            flops: slots * elements::FLOPS_PER_NODE,
-            gathers: 0,
-        };
-        for (nodes, tets, clusters, batches) in kinds {
-            cost.flops += clusters * elements::flops(nodes, tets, &self.options.material.law);
-            cost.gathers += elements::WIDTH * batches * nodes;
-        }
-        cost
-    }
-
     fn check_contact(&self, contact: &[ContactNode]) -> Result<(), SolverError> {
         for (index, entry) in contact.iter().enumerate() {
             let fail = |reason| {
@@ -377,15 +364,4 @@ impl Solver {
         }
         Ok(())
     }
-}
-
-/// See [`Solver::step_cost`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StepCost {
-    /// Bytes read or written at least once an inner step.
-    pub bytes: usize,
-    /// Floating-point operations of an inner step.
-    pub flops: usize,
-    /// Nodes gathered, and scattered to, by the clusters of an inner step: four a tetrahedron without clusters.
-    pub gathers: usize,
 }

@@ -23,7 +23,7 @@ pub fn differences(
     threads: usize,
     quiet: bool,
 ) -> Result<Vec<Vec<f32>>> {
-    let solver = StaticSolver::new(&bench.mesh, bench.boundary, bench.material, columns)?;
+    let solver = StaticSolver::new(&bench.mesh, bench.boundary, bench.stepped, columns)?;
     let bar = progress::bar(quiet, pushes.len() as u64, "equilibria");
     let groups: Vec<&[Push]> = pushes.chunks(TOGETHER).collect();
     let work = |at: usize| {

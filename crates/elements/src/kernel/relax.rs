@@ -1,0 +1,123 @@
+//! What relaxation leaves of earlier stresses: the history of each element goes on, and its forces are added ([`crate::StressHistory`] has the equations).
+//!
+//! `S_iso = C^-1 T` with the deviator `T` of [`super::stretches`], for every law; the force of a stress `S` on corner `k` is `-V F S g_k`.
+
+use super::gradients::{gradient, of_corners, volume};
+use super::shape::{dot, edges, load};
+use super::stretches::{LaneTerms, Strain, deviator, product};
+use crate::cluster::{Cluster, corners};
+use crate::gradients::Gradients;
+use crate::principal::PLACE;
+use crate::stress_step::{SIX, StressStep};
+use lanes::{NodeLanes, WIDTH};
+
+/// An element below this det F keeps the stress that it had.
+const SOUND_DET: f32 = 0.05;
+/// `J²` at least.
+const LEAST_SQUARE: f32 = 1e-4;
+
+/// `C^-1 T` from `cof F`, `det F` and `T`, Pa.
+#[inline(always)]
+unsafe fn second_piola<L: NodeLanes>(cofactor: &[[L; 3]; 3], det: L, t: &[L; 6]) -> [L; 6] {
+    unsafe {
+        let scale = L::splat(1.0).div(det.mul(det).max(L::splat(LEAST_SQUARE)));
+        let mut inverse = [det; 6];
+        let mut at = 0;
+        for i in 0..3 {
+            for j in i..3 {
+                let sum =
+                    cofactor[1][i].mul_add(cofactor[1][j], cofactor[0][i].mul(cofactor[0][j]));
+                inverse[at] = cofactor[2][i].mul_add(cofactor[2][j], sum).mul(scale);
+                at += 1;
+            }
+        }
+        product(&inverse, t)
+    }
+}
+
+/// Takes the stresses at displacements (mm) into the `history` of the clusters, and adds the forces (µN) of each row of weights that has `forces`.
+#[inline(always)]
+pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize>(
+    law: &LaneTerms,
+    step: &StressStep,
+    (clusters, gradients): (&[Cluster<NODES, TETS>], &[Gradients<TETS>]),
+    history: *mut f32,
+    nodes: *const [f32; 4],
+    forces: [*mut [f32; 4]; 2],
+) {
+    unsafe {
+        let zero = L::splat(0.0);
+        let row = SIX * WIDTH;
+        let mut history = history;
+        for (cluster, gradients) in clusters.iter().zip(gradients) {
+            for first in (0..WIDTH).step_by(L::COUNT) {
+                let (edge, _) = edges::<L, NODES, TETS>(cluster, first, nodes);
+                let mut force = [[[zero; 3]; NODES]; 2];
+                for tet in 0..TETS {
+                    let [a, b, c] = corners::<NODES>(tet);
+                    let rows = &gradients.rows[tet];
+                    let h = gradient(rows, first, of_corners(tet, &edge));
+                    let (cofactor, change) = volume(&h);
+                    let det = change.add(L::splat(1.0));
+                    let t = deviator(law, &Strain::new(&h));
+                    let now = second_piola(&cofactor, det, &t);
+                    let own = history.add(tet * (step.count + 1) * row + first);
+                    let mut sums = [[zero; SIX]; 2];
+                    for k in 0..SIX {
+                        let before = L::load(own.add(k * WIDTH));
+                        let now = det.below(L::splat(SOUND_DET), before, now[k]);
+                        now.store(own.add(k * WIDTH));
+                        let change = now.sub(before);
+                        for side in 0..2 {
+                            sums[side][k] = now.mul(L::splat(step.weights[side][0]));
+                        }
+                        for branch in 0..step.count {
+                            let at = own.add((branch + 1) * row + k * WIDTH);
+                            let kept = L::load(at).mul(L::splat(step.decay[branch]));
+                            let q = change.mul_add(L::splat(step.gain[branch]), kept);
+                            q.store(at);
+                            for side in 0..2 {
+                                let weight = L::splat(step.weights[side][branch + 1]);
+                                sums[side][k] = q.mul_add(weight, sums[side][k]);
+                            }
+                        }
+                    }
+                    let volume = zero.sub(load::<L>(&gradients.volume[tet], first));
+                    for side in 0..2 {
+                        if forces[side].is_null() {
+                            continue;
+                        }
+                        for (corner, node) in [a, b, c].into_iter().enumerate() {
+                            let g = [
+                                load::<L>(&rows[3 * corner], first).mul(volume),
+                                load::<L>(&rows[3 * corner + 1], first).mul(volume),
+                                load::<L>(&rows[3 * corner + 2], first).mul(volume),
+                            ];
+                            let along = |i: usize| [0, 1, 2].map(|j| sums[side][PLACE[i][j]]);
+                            let pulled = [dot(along(0), g), dot(along(1), g), dot(along(2), g)];
+                            for i in 0..3 {
+                                let both = pulled[i].add(dot(h[i], pulled));
+                                force[side][node][i] = force[side][node][i].add(both);
+                            }
+                        }
+                    }
+                }
+                for side in 0..2 {
+                    if forces[side].is_null() {
+                        continue;
+                    }
+                    for node in 1..NODES {
+                        for i in 0..3 {
+                            force[side][0][i] = force[side][0][i].sub(force[side][node][i]);
+                        }
+                    }
+                    for node in 0..NODES {
+                        let slots = cluster.slots[node].as_ptr().add(first);
+                        L::scatter_add(forces[side], slots, force[side][node]);
+                    }
+                }
+            }
+            history = history.add(TETS * (step.count + 1) * row);
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! When relaxing tissue takes a state into what it remembers ([`super::relaxing`]).
+
+use elements::StressStep;
+
+use super::Corrections;
+use super::history::History;
+use super::input::{Input, SolverContext};
+use super::solver::ImplicitSolver;
+use crate::error::{Error, Result};
+use crate::memory;
+
+const WHAT: &str = "the stresses of a cut body";
+
+impl ImplicitSolver {
+    /// Before a step of the scene: what is remembered goes on to the last published state, and what it pushes with until the end of the step is known.
+    ///
+    /// # Errors
+    /// A panic on another thread of the pool.
+    pub(super) fn remember(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<()> {
+        let Some(own) = &mut self.relaxing else {
+            return Ok(());
+        };
+        let step_s = context.time_step.integrator.step_s;
+        own.next_since_s = step_s;
+        own.next_is_new = input.still;
+        if input.still {
+            own.pushes.iter_mut().for_each(|push| push.fill(0.0));
+            return Ok(());
+        }
+        let forces = &context.corrections.body.forces;
+        let relaxation = forces.relaxation();
+        let g0 = relaxation.over(context.corrections.time_step.integrator.step_s);
+        let step = StressStep::new(relaxation, own.since_s, [0.0, step_s], g0);
+        let [from, to] = &mut own.pushes;
+        let failed = std::sync::Mutex::new(None);
+        forces.relax(
+            input.last,
+            &mut own.history,
+            &step,
+            &mut self.scratch,
+            [from, to],
+            &|count, task| {
+                if let Err(error) = context.pool.run(count, task) {
+                    *failed
+                        .lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner) = Some(error);
+                }
+            },
+        );
+        own.since_s = 0.0;
+        let failed = failed.into_inner();
+        match failed.unwrap_or_else(std::sync::PoisonError::into_inner) {
+            Some(error) => Err(error.into()),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks what a snapshot remembers of stresses.
+    ///
+    /// # Errors
+    /// [`Error::Snapshot`].
+    pub fn admit(&self, history: &History) -> Result<()> {
+        match (&self.relaxing, &history.relaxing) {
+            (Some(own), Some(remembered)) => remembered.check(own),
+            (None, None) => Ok(()),
+            (Some(_), None) | (None, Some(_)) => Err(Error::Snapshot(
+                "was saved of tissue that relaxes where this one does not, or the reverse".into(),
+            )),
+        }
+    }
+
+    /// Takes what the same tissue remembered before it was cut; `parents` of the elements of both bodies.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn remember_as(
+        &mut self,
+        corrections: &Corrections,
+        (before, other): (&ImplicitSolver, &Corrections),
+        parents: [&[u32]; 2],
+    ) -> Result<()> {
+        let (Some(own), Some(from)) = (&mut self.relaxing, &before.relaxing) else {
+            return Ok(());
+        };
+        let [forces, source] = [corrections, other].map(|own| &own.body.forces);
+        let taken = forces.follow_history(&mut own.history, (source, &from.history), parents);
+        memory::tried(taken, WHAT)?;
+        own.since_s = from.since_s;
+        Ok(())
+    }
+
+    /// Bytes that what it remembers has in a snapshot, at most.
+    pub fn remembered_bytes(&self) -> usize {
+        let own = self.relaxing.as_ref();
+        own.map_or(0, |own| own.history.bytes() + 64)
+    }
+
+    /// Whether the tissue relaxes.
+    pub fn relaxes(&self) -> bool {
+        self.relaxing.is_some()
+    }
+}
