@@ -548,9 +548,9 @@ typedef struct upt_model_options {
    */
   uint8_t fallback;
   /**
-   * Zero.
+   * 1: the same bits on every processor, for replays and lockstep; steps take longer. Reduced bundles without a network.
    */
-  uint8_t reserved;
+  uint8_t portable;
   /**
    * A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.
    */

@@ -41,7 +41,7 @@ impl PointGrid {
         let extent = [0, 1, 2].map(|axis| (high[axis] - low[axis]).max(1e-3));
         let volume = extent[0] as f64 * extent[1] as f64 * extent[2] as f64;
         let longest = extent.iter().copied().fold(0.0, f32::max);
-        let cell = ((2.0 * volume / count as f64).cbrt() as f32).max(longest / 256.0);
+        let cell = (libm::cbrt(2.0 * volume / count as f64) as f32).max(longest / 256.0);
         let dims = extent.map(|length| (length / cell) as usize + 1);
         let mut grid = PointGrid {
             points,

@@ -161,6 +161,9 @@ pub struct ModelOptions {
     pub user_stream: Option<UserStream>,
     /// Try the next provider where one cannot run the model; otherwise [`crate::Error::Provider`].
     pub fallback: bool,
+    /// The same bits on every processor: one order of all sums, and multiply-adds that are rounded twice. For reduced bundles without a
+    /// network; [`crate::Error::Unsupported`] for others.
+    pub portable: bool,
 }
 
 impl Default for ModelOptions {
@@ -176,6 +179,7 @@ impl Default for ModelOptions {
             cuda_graph: false,
             user_stream: None,
             fallback: true,
+            portable: false,
         }
     }
 }

@@ -322,8 +322,8 @@ class ModelOptions(Record):
     """1: capture CUDA graphs."""
     fallback: bool | None = switch("_fallback")
     """`UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`."""
-    reserved: int
-    """Zero."""
+    portable: bool = boolean("_portable")
+    """1: the same bits on every processor, for replays and lockstep; steps take longer. Reduced bundles without a network."""
     user_stream: int | None
     """A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own."""
 
@@ -339,7 +339,7 @@ class ModelOptions(Record):
         ("_allow_tf32", ctypes.c_uint8),
         ("_cuda_graph", ctypes.c_uint8),
         ("_fallback", ctypes.c_uint8),
-        ("reserved", ctypes.c_uint8),
+        ("_portable", ctypes.c_uint8),
         ("user_stream", ctypes.c_void_p),
     ]
 
@@ -365,6 +365,8 @@ class ModelOptionsKeywords(TypedDict, total=False):
     """1: capture CUDA graphs."""
     fallback: bool | None
     """`UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`."""
+    portable: bool
+    """1: the same bits on every processor, for replays and lockstep; steps take longer. Reduced bundles without a network."""
     user_stream: int | None
     """A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own."""
 

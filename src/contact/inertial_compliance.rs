@@ -31,6 +31,8 @@ pub struct At<'a> {
     fixed: &'a [f32],
     /// By mode, what inertia takes off its compliance at this time.
     lost: &'a [f32],
+    /// Of the modes.
+    isa: Isa,
 }
 
 impl InertialCompliance {
@@ -46,7 +48,10 @@ impl InertialCompliance {
         rows: &[u32],
     ) -> Result<At<'a>> {
         let order = 3 * rows.len();
-        let lost = compliance.inertia.map_or(&[][..], |(_, lost)| lost);
+        let (isa, lost) = match compliance.inertia {
+            Some((space, lost)) => (space.isa(), lost),
+            None => (Isa::Scalar, &[][..]),
+        };
         let alone = Compliance {
             inertia: None,
             ..compliance
@@ -63,6 +68,7 @@ impl InertialCompliance {
             own: self,
             fixed,
             lost,
+            isa,
         })
     }
 
@@ -115,7 +121,7 @@ impl Rows for At<'_> {
                     .extend(modes.map(|(mode, lost)| -lost * mode[at]));
                 let row = &mut own.rows[at * order..(at + 1) * order];
                 columns_f32(
-                    Isa::detect(),
+                    self.isa,
                     &own.modes,
                     order,
                     &own.all,

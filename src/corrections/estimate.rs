@@ -22,8 +22,11 @@ impl ImplicitSolver {
     /// what is left of the error of the state before, from which this one started.
     pub(super) fn estimate(&mut self, report: &mut Report) {
         let far = FAR_ERROR * report.far_mm;
-        let own = report.remaining_mm.hypot(far).hypot(self.next.truncated_mm);
-        report.error_mm = own.hypot(KEPT * self.motion.error_mm);
+        let own = libm::hypotf(
+            libm::hypotf(report.remaining_mm, far),
+            self.next.truncated_mm,
+        );
+        report.error_mm = libm::hypotf(own, KEPT * self.motion.error_mm);
         // What no number describes is told once, and not remembered.
         self.next.error_mm = match report.error_mm.is_finite() {
             true => report.error_mm,
@@ -34,11 +37,12 @@ impl ImplicitSolver {
     /// Whether `iterations` have corrected a step enough: the error is as small as was asked, or further iterations could not make it smaller, by
     /// what the last step left and left out.
     pub(super) fn suffices(&self, iterations: u32, remaining_mm: f32, enough: Enough) -> bool {
-        let rest = self.motion.truncated_mm.hypot(KEPT * self.motion.error_mm);
+        let rest = libm::hypotf(self.motion.truncated_mm, KEPT * self.motion.error_mm);
         let wanted = enough.error_mm;
         wanted > 0.0
             && iterations >= LEAST
-            && (remaining_mm.hypot(rest) < wanted || (rest >= wanted && remaining_mm < 0.1 * rest))
+            && (libm::hypotf(remaining_mm, rest) < wanted
+                || (rest >= wanted && remaining_mm < 0.1 * rest))
     }
 
     /// What a further iteration would move, from the last one's step and by how much it lessened the residual, mm.

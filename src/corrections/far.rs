@@ -18,8 +18,8 @@ use ::elements::{Deformation, Moduli, stress, vector};
 use super::body::Body;
 use crate::bundle::{Mesh, volume};
 use crate::error::Result;
+use crate::kernels::Pool;
 use crate::kernels::rows::{RowPlan, decode_rows};
-use crate::kernels::{Isa, Pool};
 use crate::memory::{self, HeldBytes};
 use crate::prior::{CoarseSpace, PriorTable};
 
@@ -95,7 +95,7 @@ impl FarField {
         let whole: f64 = mesh.tets.as_chunks().0.iter().map(sixfold).sum();
         // A regular tetrahedron's is a³ / sqrt 2.
         let mean = whole / own.cluster_of.len().max(1) as f64;
-        own.edge_mm = (std::f64::consts::SQRT_2 * mean).cbrt() as f32;
+        own.edge_mm = libm::cbrt(std::f64::consts::SQRT_2 * mean) as f32;
         own.decode(prior, space)?;
         Ok(own)
     }
@@ -155,10 +155,10 @@ impl FarField {
             memory::zeros(prior.width(), WHAT)?,
             memory::zeros(held, WHAT)?,
         );
-        let pool = Pool::new(1)?;
+        let pool = Pool::of(space.isa(), 1)?;
         for mode in 0..count {
             space.read_mode(mode, &mut q);
-            decode_rows(Isa::detect(), &pool, &prior.basis(), &plan, &q, &mut field)?;
+            decode_rows(space.isa(), &pool, &prior.basis(), &plan, &q, &mut field)?;
             for chunk in 0..self.volumes.len() {
                 let gradient = self.gradient(chunk, &field);
                 for (row, value) in gradient.into_iter().enumerate() {

@@ -115,7 +115,7 @@ impl ImplicitSolver {
         })?;
         let nodes = (next.len() / 3) as f64;
         let [bend, jerk] = [0, 1].map(|at| (sums.total(at) / nodes).sqrt());
-        let truncated = (BEND * bend).hypot(JERK * jerk);
+        let truncated = libm::hypot(BEND * bend, JERK * jerk);
         self.leave_load();
         let own = &mut self.next;
         own.min_det = 1.0;

@@ -94,6 +94,7 @@ impl Corrections {
         files: &BundleFiles,
         mesh: &Mesh,
         prior: Option<&PriorTable>,
+        isa: Isa,
     ) -> Result<Corrections> {
         let manifest = &files.manifest;
         let (entry, prior) = needed(manifest, prior)?;
@@ -103,8 +104,8 @@ impl Corrections {
             damping_per_s: material.damping_per_s,
         };
         let diagonal = Diagonal::of(mesh, material)?;
-        let space = CoarseSpace::parse(&files.tensors(&entry.file)?, prior)?;
-        let body = Body::new(mesh, material, &diagonal, Isa::detect())?;
+        let space = CoarseSpace::parse(&files.tensors(&entry.file)?, prior, isa)?;
+        let body = Body::new(mesh, material, &diagonal, isa)?;
         Ok(Corrections {
             far: FarField::new(&body, mesh, material.moduli(), prior, &space)?,
             space,

@@ -86,7 +86,7 @@ impl ImplicitSolver {
         }
         let whole = self.correct_loaded(context, input, problem, next)?;
         // Where the iterations have lost the contact they would lose it again.
-        let helps = substeps.helps(self.next.truncated_mm.hypot(whole.remaining_mm));
+        let helps = substeps.helps(libm::hypotf(self.next.truncated_mm, whole.remaining_mm));
         if whole.fell_back || !helps {
             return Ok(whole);
         }

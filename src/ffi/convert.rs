@@ -196,7 +196,6 @@ pub(super) unsafe fn init_options(raw: &upt_init_options) -> Result<InitOptions,
 }
 
 pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptions, Failure> {
-    reserved(&[raw.reserved])?;
     if raw.provider_count > MOST_PROVIDERS {
         return fail(
             UPT_ERR_ARGUMENT,
@@ -225,6 +224,7 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
         user_stream: (!raw.user_stream.is_null())
             .then(|| unsafe { UserStream::new(raw.user_stream) }),
         fallback: switch("fallback", raw.fallback)?,
+        portable: flag("portable", raw.portable)?,
     })
 }
 

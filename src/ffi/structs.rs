@@ -72,8 +72,8 @@ pub struct upt_model_options {
     pub cuda_graph: u8,
     /// `UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`.
     pub fallback: u8,
-    /// Zero.
-    pub reserved: u8,
+    /// 1: the same bits on every processor, for replays and lockstep; steps take longer. Reduced bundles without a network.
+    pub portable: u8,
     /// A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.
     pub user_stream: *mut c_void,
 }

@@ -1,14 +1,14 @@
 //! The two transcendental functions of the network, in f32: exact GELU
 //! `x Phi(x) = x/2 (1 + erf(x / sqrt 2))` and `2^x`; and the product that is added at once.
 
-use lanes::DenseLanes;
+use lanes::{DenseLanes, Lanes};
 
-/// `a b + c` in f64, rounded once where the processor does that in one instruction. WebAssembly has none: there a function would.
+/// `a b + c` in f64, rounded once where the lanes `V` do that in one instruction.
 #[inline(always)]
-pub(super) fn fused(a: f64, b: f64, c: f64) -> f64 {
-    match cfg!(target_family = "wasm") {
-        true => a * b + c,
-        false => a.mul_add(b, c),
+pub(super) fn fused<V: Lanes>(a: f64, b: f64, c: f64) -> f64 {
+    match V::FUSED {
+        true => a.mul_add(b, c),
+        false => a * b + c,
     }
 }
 

@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use crate::error::Error;
-use lanes::flush::FlushToZero;
+use lanes::{FlushToZero, Isa};
 use worker::{Job, Shared, Task, panic_message, worker_loop};
 
 /// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs what
@@ -62,6 +62,8 @@ pub struct Pool {
     workers: Vec<JoinHandle<()>>,
     /// Held by the caller whose job the workers run.
     submit: Mutex<()>,
+    /// Of the kernels that it runs: the floating-point mode is theirs.
+    isa: Isa,
 }
 
 impl Pool {
@@ -70,18 +72,27 @@ impl Pool {
     /// # Errors
     /// [`PoolError::Spawn`] where the system refuses a thread.
     pub fn new(threads: usize) -> Result<Self, PoolError> {
+        Self::of(Isa::Scalar, threads)
+    }
+
+    /// The same for kernels of a set.
+    ///
+    /// # Errors
+    /// As [`Pool::new`].
+    pub fn of(isa: Isa, threads: usize) -> Result<Self, PoolError> {
         let shared = Arc::new(Shared::new());
         let mut pool = Self {
             shared,
             workers: Vec::new(),
             submit: Mutex::new(()),
+            isa,
         };
         let count = threads.saturating_sub(1);
         for index in 0..count {
             let shared = Arc::clone(&pool.shared);
             let handle = std::thread::Builder::new()
                 .name(format!("upt-worker-{}", index + 1))
-                .spawn(move || worker_loop(&shared, index + 1))
+                .spawn(move || worker_loop(&shared, isa, index + 1))
                 .map_err(|e| PoolError::Spawn {
                     index,
                     count,
@@ -98,7 +109,7 @@ impl Pool {
     }
 
     /// Runs `task(chunk, worker)` for every `chunk` in `0..chunk_count` and returns when all are
-    /// done. Denormals are flushed inside; the caller's floating-point mode is restored.
+    /// done. Denormals are flushed inside, but for portable kernels; the caller's floating-point mode is restored.
     ///
     /// If another thread's job (or an outer job of this thread) has the workers, all chunks run on
     /// the calling thread with `worker` 0: the same bits, no waiting. Scratch space indexed by
@@ -107,7 +118,7 @@ impl Pool {
     /// # Errors
     /// [`PoolError::Panicked`] names the first chunk seen to panic; others may not have run.
     pub fn run(&self, chunk_count: usize, task: &Task<'_>) -> Result<(), PoolError> {
-        let _flush = FlushToZero::enter();
+        let _flush = FlushToZero::of(self.isa);
         let submit = match self.submit.try_lock() {
             Ok(guard) => Some(guard),
             Err(std::sync::TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
@@ -195,7 +206,7 @@ impl Pool {
         if bytes >= least {
             return self.run(chunk_count, task);
         }
-        let _flush = FlushToZero::enter();
+        let _flush = FlushToZero::of(self.isa);
         run_alone(chunk_count, task)
     }
 }

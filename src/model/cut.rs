@@ -57,6 +57,7 @@ impl Model {
             runtime: self.runtime,
             plan: self.plan.clone(),
             threads: self.threads,
+            isa: self.isa,
             precision: self.precision,
             choice: self.choice.clone(),
             load_seconds: self.load_seconds,

@@ -3,6 +3,8 @@
 mod anchors;
 mod cut;
 mod info;
+mod portable;
+mod precision;
 mod reduced;
 mod supports;
 mod upt;
@@ -22,6 +24,7 @@ pub use upt_stages::DECODER_TILE;
 use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, Place};
 use crate::corrections::Corrections;
 use crate::error::Result;
+use crate::kernels::{FlushToZero, Isa};
 use crate::library::{self, Alive};
 use crate::memory::HeldBytes;
 use crate::onnx::{ProviderChoice, ProviderPlan, Runtime};
@@ -62,6 +65,8 @@ pub struct Model {
     runtime: Option<&'static Runtime>,
     pub(crate) plan: ProviderPlan,
     pub(crate) threads: usize,
+    /// Of all kernels of its scenes.
+    pub(crate) isa: Isa,
     pub(crate) precision: Precision,
     choice: ProviderChoice,
     load_seconds: f64,
@@ -134,6 +139,8 @@ impl Model {
     ) -> Result<Arc<Model>> {
         let process = library::current();
         let manifest = files.manifest.clone();
+        let isa = portable::set_of(options, &manifest)?;
+        let _mode = FlushToZero::of_portable(isa);
         let mesh_file = files.tensors(&manifest.mesh.file)?;
         let mut mesh = Mesh::parse(&mesh_file, manifest.boundary)?;
         mesh.take_supports(&manifest.supports)?;
@@ -173,7 +180,7 @@ impl Model {
             (0, n) => n,
             (n, _) => n,
         };
-        let graphs = graph_precision(&files, options);
+        let graphs = precision::of_graphs(&files, options);
         let (kind, choice) = match manifest.kind {
             ManifestKind::Reduced => {
                 let (model, choice) = ReducedModel::open(&files, load, &plan, graphs)?;
@@ -198,6 +205,7 @@ impl Model {
             runtime,
             plan,
             threads,
+            isa,
             precision: options.precision.unwrap_or(Precision::F32),
             choice,
             load_seconds: start.elapsed().as_secs_f64(),
@@ -219,7 +227,8 @@ impl Model {
         if let Some(made) = self.corrections.get() {
             return Ok(made);
         }
-        let made = Corrections::open(&self.files, &self.mesh, self.prior.as_deref())
+        let _mode = FlushToZero::of_portable(self.isa);
+        let made = Corrections::open(&self.files, &self.mesh, self.prior.as_deref(), self.isa)
             .and_then(|made| crate::memory::boxed(made, "the corrections"))
             .map_err(|error| self.files.name_maker(error))?;
         Ok(self.corrections.get_or_init(|| made))
@@ -327,7 +336,7 @@ impl Model {
             "providers_refused": refused,
             "latent_nodes": self.choice.nodes,
             "latent_memory": self.choice.memory,
-            "instruction_set": format!("{:?}", crate::kernels::Isa::detect()),
+            "instruction_set": format!("{:?}", self.isa),
             "onnxruntime": self.runtime.map(|runtime| {
                 serde_json::json!({"path": runtime.path().display().to_string(), "version": runtime.version()})
             }),
@@ -378,23 +387,5 @@ impl Model {
             IndexSet::DomainFaces => &self.mesh.domain_faces,
             IndexSet::Tets => &self.mesh.tets,
         }
-    }
-}
-
-/// Which variant of the graphs to read. TensorRT narrows a float32 graph itself, so float16 there needs no variant.
-fn graph_precision(files: &BundleFiles, options: &ModelOptions) -> Precision {
-    let narrows =
-        |provider: &Provider| matches!(provider, Provider::TensorRt | Provider::TensorRtRtx);
-    match options.precision {
-        Some(Precision::F16) => {
-            let has = files.graph_file("latent", Precision::F16).is_ok();
-            if !has && options.providers.iter().any(narrows) {
-                Precision::F32
-            } else {
-                Precision::F16
-            }
-        }
-        Some(Precision::Int8) => Precision::Int8,
-        Some(Precision::F32 | Precision::Bf16) | None => Precision::F32,
     }
 }

@@ -44,13 +44,16 @@ pub struct CoarseSpace {
     #[held(skip)]
     inverses: Arc<Mutex<Inverses>>,
     keeps: bool,
+    /// Of the kernels that read the modes.
+    #[held(skip)]
+    isa: Isa,
 }
 
 type Inverses = Vec<(u64, Vec<f32>)>;
 
 impl CoarseSpace {
     /// Reads and checks the tables for a prior.
-    pub fn parse(file: &TensorFile, prior: &PriorTable) -> Result<CoarseSpace> {
+    pub fn parse(file: &TensorFile, prior: &PriorTable, isa: Isa) -> Result<CoarseSpace> {
         let modes = file.f16("modes", &[None, Some(prior.width())])?;
         let count = modes.len() / prior.width().max(1);
         if count == 0 || count > LIMIT {
@@ -75,6 +78,7 @@ impl CoarseSpace {
             at_added: Vec::new(),
             inverses: Arc::default(),
             keeps: false,
+            isa,
             rows: memory::collected(count, 0..count as u32, WHAT)?,
             modes: Arc::new(Numbers::of_f16(modes)?),
             stiffness,
@@ -96,6 +100,11 @@ impl CoarseSpace {
             }
         }
         Ok(rows)
+    }
+
+    /// The set whose kernels read the modes.
+    pub fn isa(&self) -> Isa {
+        self.isa
     }
 
     /// The block coordinates `[Q]` of a mode.

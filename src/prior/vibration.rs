@@ -164,14 +164,14 @@ pub fn propagator(omega: f64, damping: f64, dt: f64) -> [f32; 4] {
     let half = 0.5 * damping;
     let squared = omega * omega - half * half;
     let root = squared.abs().sqrt();
-    let decay = (-half * dt).exp();
+    let decay = libm::exp(-half * dt);
     // sin(r t) / r and cos(r t), with r imaginary where the mode is overdamped.
     let (sine, cosine) = if root * dt < 1e-6 {
         (dt, 1.0)
     } else if squared > 0.0 {
-        ((root * dt).sin() / root, (root * dt).cos())
+        (libm::sin(root * dt) / root, libm::cos(root * dt))
     } else {
-        ((root * dt).sinh() / root, (root * dt).cosh())
+        (libm::sinh(root * dt) / root, libm::cosh(root * dt))
     };
     let impulse = decay * sine;
     let place = decay * cosine + half * impulse;

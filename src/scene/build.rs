@@ -10,7 +10,7 @@ use crate::bundle::{Mesh, TensorFile};
 use crate::envelope::EnvelopeCheck;
 use crate::error::{Error, Result};
 use crate::features::Proven;
-use crate::kernels::{Isa, Pool};
+use crate::kernels::{FlushToZero, Pool};
 use crate::memory;
 use crate::model::{KindModel, Model};
 use crate::options::{SceneOptions, StepPath};
@@ -32,7 +32,9 @@ pub(super) fn build(
             "threads is {threads}, must be at most 1024"
         )));
     }
-    let pool = Pool::new(threads)?;
+    let isa = model.isa;
+    let _mode = FlushToZero::of_portable(isa);
+    let pool = Pool::of(isa, threads)?;
     let own_mesh = match &options.mesh_path {
         None => None,
         Some(path) => {
@@ -81,11 +83,12 @@ pub(super) fn build(
             Engine::Upt(Proven::new(make, core::SCENE)?)
         }
     };
-    let corrected = Corrector::new(model, options, Isa::detect(), &pool)?;
+    let corrected = Corrector::new(model, options, isa, &pool)?;
     Core::new(CoreParts {
         model: Arc::clone(model),
         mesh: own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh)),
         options: options.clone(),
+        isa,
         pool,
         engine,
         corrected,

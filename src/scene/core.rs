@@ -99,6 +99,7 @@ pub struct CoreParts {
     pub model: Arc<Model>,
     pub mesh: Arc<Mesh>,
     pub options: SceneOptions,
+    pub isa: Isa,
     pub pool: Pool,
     pub engine: Engine,
     pub corrected: Option<Corrector>,
@@ -151,7 +152,7 @@ impl Core {
             mesh: parts.mesh,
             options: parts.options,
             machine: Machine {
-                isa: Isa::detect(),
+                isa: parts.isa,
                 pool: parts.pool,
             },
             engine: parts.engine,
@@ -215,7 +216,7 @@ impl Core {
         input: StepInput<'_>,
         out: Option<Output<'_, f32>>,
     ) -> Result<()> {
-        let _flush = FlushToZero::enter();
+        let _mode = FlushToZero::of(self.machine.isa);
         let start = Instant::now();
         let _span = tracing::debug_span!("step", step = self.counters.step_count).entered();
         let mut stats = self.blank_stats();

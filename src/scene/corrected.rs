@@ -79,6 +79,12 @@ impl Corrector {
                 (most, target_mm, budget_us)
             }
         };
+        if budget_us > 0 && isa.is_portable() {
+            return Err(Error::Argument(
+                "corrections: a budget in µs makes steps depend on time, and the model was opened as portable; set 0, and a count or a target"
+                    .into(),
+            ));
+        }
         if !(1..=MOST_CORRECTIONS).contains(&most) {
             return Err(Error::Argument(format!(
                 "corrections is {most}, must be 1 to {MOST_CORRECTIONS}"

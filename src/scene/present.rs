@@ -66,7 +66,7 @@ impl Scene {
         input.check_of_frame()?;
         supports::check(input.loads.supports, &self.mesh.supports)?;
         lock_read(&self.shared.published).check_len(view, out.len())?;
-        let _flush = FlushToZero::enter();
+        let _mode = FlushToZero::of(self.model.isa);
         let mut presenters = lock(&self.tools.presenters)?;
         // While frames are held no body changes.
         let cut = lock_read(&self.shared.published).cut.clone();

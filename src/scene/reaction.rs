@@ -75,7 +75,7 @@ impl Core {
         let Some(linear) = self.engine.linear_mut() else {
             return Ok(false);
         };
-        let _flush = FlushToZero::enter();
+        let _mode = FlushToZero::of(self.machine.isa);
         let contact = &self.contact;
         // The last solve may be of a contact that the guard refused, or, after a restore, of another time. The factor is
         // kept where the nodes are the same.

@@ -53,7 +53,7 @@ impl Core {
                 "there is no state to decode before the first step; step the scene first".into(),
             ));
         }
-        let _flush = FlushToZero::enter();
+        let _mode = FlushToZero::of(self.machine.isa);
         let plan = NodePlan::new(&[nodes], count, self.engine.planned_prior())?;
         let points = AttachedPoints::default();
         self.decode_published(published, Which::Last, &plan, &points, &mut [])?;
@@ -147,7 +147,7 @@ impl Core {
             )?,
             _ => NodePlan::all(count, table)?,
         };
-        let _flush = FlushToZero::enter();
+        let _mode = FlushToZero::of(self.machine.isa);
         let compute = self.machine.compute();
         self.engine.replan(compute, &plan)?;
         let mut frames = [Frame::default(), Frame::default()];

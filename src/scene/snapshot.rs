@@ -82,7 +82,7 @@ impl Core {
         }
         self.admit(&mut state)?;
         // What is computed from it may still fail: the old state is kept until then.
-        let _flush = FlushToZero::enter();
+        let _mode = FlushToZero::of(self.machine.isa);
         let old = self.state(published)?;
         let taken = self
             .put(published, state)
@@ -117,7 +117,7 @@ impl Core {
         let mut next = self.with_body(body)?;
         let shown = RwLock::new(next.blank_published()?);
         next.admit(&mut state)?;
-        let _flush = FlushToZero::enter();
+        let _mode = FlushToZero::of(self.machine.isa);
         next.put(&shown, state)?;
         next.recompute(&shown)?;
         next.fit_state(&shown)?;

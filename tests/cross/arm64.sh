@@ -94,11 +94,22 @@ more() {
   text="$(run "$1/upt" doctor onnx/brain-coarse-reduced 2>/dev/null)"
   check "upt doctor opens a bundle with NEON kernels" grep -q 'kernels neon' <<<"$text"
   lanes "$text"
+  portable "$1"
   if [ "$nightly" = 1 ]; then
     wheel "$1"
   else
     leave_out "$(grep -h '^def test_' python/tests/test_*.py | wc -l)" "tests of the Python wheel in Debian's Python for arm64: nightly"
   fi
+}
+
+# A tool that presses a portable model: to the bit what it does here.
+portable() {
+  cc -O2 -I include tests/web/press.c "$native/libupt.so" -o "$build/press.x86-64"
+  "${UPT_CROSS_PREFIX}gcc" -O2 -I include tests/web/press.c "$1/libupt.so" -o "$build/press"
+  ln -sf "$1/libupt.so" "$build/prefix/lib/libupt.so.0"
+  LD_LIBRARY_PATH="$build" "$build/press.x86-64" onnx/liver-coarse 32 3 "$build/press.here" >"$build/press.log"
+  run "$build/press" onnx/liver-coarse 32 3 "$build/press.there" >"$build/press.log" || true
+  check "a portable model has the bits of x86-64 with NEON" cmp "$build/press.here" "$build/press.there"
 }
 
 # The wheel in Debian's Python for arm64: it finds its own libupt, and ONNX Runtime in the package onnxruntime.

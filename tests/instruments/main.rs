@@ -14,6 +14,7 @@ mod extremes;
 mod fixture;
 #[path = "../host/mod.rs"]
 mod host;
+mod portable;
 mod through_the_abi;
 
 use contact::{Shape, Vector};

@@ -28,7 +28,7 @@ function refused(status, words) {
   };
 }
 
-// Of native scalar, from the file of press.c: the largest difference of each array.
+// Of the native library, from the file of press.c: the largest difference of each array.
 function differences(states, name, corrections) {
   const bytes = readFileSync(join(native, `${name.split("/").pop()}.${corrections}.bin`));
   const told = new Float32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4);
@@ -38,11 +38,11 @@ function differences(states, name, corrections) {
 }
 
 const tests = {
-  async scalar_lanes_have_the_bits_of_native_scalar() {
+  async a_portable_model_has_the_bits_of_a_native_one() {
     for (const [name, corrections] of rollouts()) {
-      const upt = await start("scalar");
-      const model = await upt.open(bundle(name));
-      assert.equal(model.describe().instruction_set, "Scalar");
+      const upt = await start();
+      const model = await upt.open(bundle(name), { portable: true });
+      assert.equal(model.describe().instruction_set, "Portable");
       const states = press(upt, model, { steps: 32, corrections });
       assert.ok(states[45].some((x) => x > 1), "the ball presses");
       const apart = differences(states, name, corrections).filter((most) => most !== 0);
@@ -50,8 +50,8 @@ const tests = {
     }
   },
 
-  // On the liver: under a ball on a fold of the brain native AVX2 differs from native scalar by a millimetre too.
-  async simd_lanes_are_near_native_scalar() {
+  // On the liver: under a ball on a fold of the brain native AVX2 differs from portable lanes by a millimetre too.
+  async others_are_near_it() {
     for (const [name, corrections] of rollouts().filter(([name]) => name.includes("liver"))) {
       const upt = await start();
       const model = await upt.open(bundle(name));

@@ -4,7 +4,8 @@
  *   press BUNDLE STEPS CORRECTIONS FILE
  *
  * Prints the milliseconds of each step. FILE, for each step: [K,3] displacements (mm), the force on
- * the ball (mN), and [K,3] displacements 7 ms later. One ball, 20 ms steps.
+ * the ball (mN), and [K,3] displacements 7 ms later. One ball, 20 ms steps. The model is portable:
+ * every machine writes the same file.
  */
 #include "upt.h"
 
@@ -21,6 +22,7 @@ static void ok(upt_status status) {
 
 int main(int argc, char **argv) {
   upt_model_info info;
+  upt_model_options portable;
   upt_scene_options options;
   upt_instrument ball;
   upt_input input;
@@ -37,7 +39,10 @@ int main(int argc, char **argv) {
     fprintf(stderr, "usage: %s BUNDLE STEPS CORRECTIONS FILE\n", argv[0]);
     return 2;
   }
-  ok(upt_model_open(argv[1], NULL, &model));
+  memset(&portable, 0, sizeof portable);
+  portable.struct_size = sizeof portable;
+  portable.portable = 1;
+  ok(upt_model_open(argv[1], &portable, &model));
   memset(&info, 0, sizeof info);
   info.struct_size = sizeof info;
   ok(upt_model_get_info(model, &info));

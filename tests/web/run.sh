@@ -13,12 +13,16 @@ rm -rf "$build"
 mkdir -p "$build"
 source tests/cross/count.sh
 
-echo "== what native scalar lanes compute"
+echo "== what portable lanes compute natively, and scalar ones"
 cc -O2 -I include tests/web/press.c "$native/libupt.so" -Wl,-rpath,"$build" -o "$build/press"
 ln -s "$native/libupt.so" "$build/libupt.so.0"
 # press BUNDLE CORRECTIONS: 0 is as many as the bundle recommends.
 press() {
-  UPT_ISA=scalar "$build/press" "$1" 32 "$2" "$build/$(basename "$1").$2.bin" >"$build/times"
+  local file
+  file="$build/$(basename "$1").$2"
+  "$build/press" "$1" 32 "$2" "$file.bin" >"$build/times"
+  UPT_ISA=scalar "$build/press" "$1" 32 "$2" "$file.scalar" >"$build/times"
+  check "$1, $2 corrections: scalar lanes have the bits of $(uname -m)'s" cmp "$file.bin" "$file.scalar"
 }
 press onnx/liver-coarse 3
 press onnx/liver-coarse 0

@@ -110,7 +110,7 @@ export const upt_model_options = {
     allow_tf32: ["Uint8", 44, 1],
     cuda_graph: ["Uint8", 45, 1],
     fallback: ["Uint8", 46, 1],
-    reserved: ["Uint8", 47, 1],
+    portable: ["Uint8", 47, 1],
     user_stream: ["Uint32", 48, 1],
   },
 };

@@ -20,6 +20,8 @@ export interface OpenOptions {
   fetch?: (url: URL) => Promise<Response>;
   /** Called as files come: bytes so far, and of all. */
   progress?: (done: number, total: number) => void;
+  /** The same bits as on every other machine, for replays and lockstep. */
+  portable?: boolean;
 }
 
 export interface Upt {

@@ -42,7 +42,7 @@ class Upt {
   }
 
   /** Opens a bundle: the address of its folder, `File`s, or bytes by name. */
-  async open(source, options) {
+  async open(source, { portable = false, ...options } = {}) {
     const given = await files(source, options);
     const { module } = this;
     for (const [name, bytes] of given) {
@@ -50,7 +50,13 @@ class Upt {
       if (at === 0) throw new UptError("UPT_ERR_OUT_OF_MEMORY", module.text(module.call("upt_last_error")));
       module.bytes(at, bytes.byteLength).set(bytes);
     }
-    return new Model(module, module.out("upt_host_open", 0));
+    return new Model(
+      module,
+      module.withRoom(abi.upt_model_options.size, (at) => {
+        module.write(at, abi.upt_model_options, { portable: portable ? 1 : 0 });
+        return module.out("upt_host_open", at);
+      }),
+    );
   }
 }
 

@@ -49,5 +49,5 @@ pub fn between(from: &Pose, to: &Pose, t: f32) -> Pose {
 /// Angle between two rotations, radians in [0, pi]; exact for small ones too.
 pub fn angle(from: &Rotation, to: &Rotation) -> f32 {
     let turn = from.inverse() * *to;
-    2.0 * turn.xyz().length().atan2(turn.w.abs())
+    2.0 * libm::atan2f(turn.xyz().length(), turn.w.abs())
 }

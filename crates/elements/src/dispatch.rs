@@ -232,6 +232,14 @@ macro_rules! kernels {
 
 #[cfg(any(not(target_family = "wasm"), feature = "scalar"))]
 kernels!(scalar, lanes::Scalar);
+#[cfg(not(any(target_arch = "aarch64", target_family = "wasm")))]
+kernels!(portable_scalar, lanes::Scalar<8>);
+#[cfg(target_arch = "x86_64")]
+kernels!(portable, lanes::Portable, "avx2,fma");
+#[cfg(target_arch = "aarch64")]
+kernels!(portable, lanes::Portable, "neon");
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+kernels!(portable, lanes::Portable);
 #[cfg(target_arch = "x86_64")]
 kernels!(avx2, lanes::Avx2, "avx2,fma");
 #[cfg(target_arch = "x86_64")]
@@ -250,6 +258,14 @@ impl Kernels {
         match isa {
             #[cfg(any(not(target_family = "wasm"), feature = "scalar"))]
             Isa::Scalar => Some(scalar::KERNELS),
+            #[cfg(not(any(target_arch = "aarch64", target_family = "wasm")))]
+            Isa::PortableScalar => Some(portable_scalar::KERNELS),
+            #[cfg(any(
+                target_arch = "x86_64",
+                target_arch = "aarch64",
+                all(target_arch = "wasm32", target_feature = "simd128")
+            ))]
+            Isa::Portable => Some(portable::KERNELS),
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2 => Some(avx2::KERNELS),
             #[cfg(target_arch = "x86_64")]

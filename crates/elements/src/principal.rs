@@ -47,7 +47,7 @@ impl Shape {
             + d[4] * d[4];
         let j3 = d[0] * (d[3] * d[5] - d[4] * d[4]) - d[1] * (d[1] * d[5] - d[4] * d[2])
             + d[2] * (d[1] * d[4] - d[3] * d[2]);
-        let log = (j3 - j2).max(LEAST - 1.0).ln_1p();
+        let log = libm::log1p((j3 - j2).max(LEAST - 1.0));
         Self { d, j2, j3, log }
     }
 
@@ -58,15 +58,15 @@ impl Shape {
             return [0.0; 3];
         }
         let cosine = (self.j3 / (2.0 * r * r * r)).clamp(-1.0, 1.0);
-        let angle = cosine.acos() / 3.0;
-        let first = 2.0 * r * angle.cos();
-        let last = 2.0 * r * (angle + std::f64::consts::TAU / 3.0).cos();
+        let angle = libm::acos(cosine) / 3.0;
+        let first = 2.0 * r * libm::cos(angle);
+        let last = 2.0 * r * libm::cos(angle + std::f64::consts::TAU / 3.0);
         [first, -first - last, last]
     }
 
     /// The logarithm of a stretch without change of volume from an eigenvalue of `D`.
     fn logarithm(&self, d: f64) -> f64 {
-        0.5 * (d.max(LEAST - 1.0).ln_1p() - self.log / 3.0)
+        0.5 * (libm::log1p(d.max(LEAST - 1.0)) - self.log / 3.0)
     }
 
     /// `(f(a) - f(b)) / (a - b)`.

@@ -4,7 +4,7 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::{CUBE_ROOT_GUESS, DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF};
+use super::{DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF};
 use core::arch::x86_64::*;
 
 /// Eight f32.
@@ -56,9 +56,26 @@ unsafe fn add_rows(nodes: *mut [f32; 4], index: *const u16, first: usize, value:
     }
 }
 
+/// Rows 0 and 4, 1 and 5, ... of what is scattered.
+#[inline(always)]
+unsafe fn forces(value: [Avx2; 3]) -> [__m256; 4] {
+    unsafe {
+        let [Avx2(x), Avx2(y), Avx2(z)] = value;
+        let xy01 = _mm256_unpacklo_ps(x, y);
+        let xy23 = _mm256_unpackhi_ps(x, y);
+        [
+            _mm256_shuffle_ps(xy01, z, 0x04),
+            _mm256_shuffle_ps(xy01, z, 0x5E),
+            _mm256_shuffle_ps(xy23, z, 0xA4),
+            _mm256_shuffle_ps(xy23, z, 0xFE),
+        ]
+    }
+}
+
 // SAFETY (all functions): the traits' contract, AVX2, FMA and F16C enabled in the caller.
 impl Lanes for Avx2 {
     const COUNT: usize = 8;
+    const FUSED: bool = true;
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
@@ -235,16 +252,13 @@ impl DenseLanes for Avx2 {
 // SAFETY (all functions): the traits' contract, AVX2, FMA and F16C enabled in the caller.
 impl NodeLanes for Avx2 {
     #[inline(always)]
-    unsafe fn inverse_cube_root_guess(self) -> Self {
-        unsafe {
-            let bits = _mm256_cvtepi32_ps(_mm256_castps_si256(self.0));
-            let guess = _mm256_fnmadd_ps(
-                bits,
-                _mm256_set1_ps(1.0 / 3.0),
-                _mm256_set1_ps(CUBE_ROOT_GUESS),
-            );
-            Self(_mm256_castsi256_ps(_mm256_cvttps_epi32(guess)))
-        }
+    unsafe fn bits_as_numbers(self) -> Self {
+        unsafe { Self(_mm256_cvtepi32_ps(_mm256_castps_si256(self.0))) }
+    }
+
+    #[inline(always)]
+    unsafe fn numbers_as_bits(self) -> Self {
+        unsafe { Self(_mm256_castsi256_ps(_mm256_cvttps_epi32(self.0))) }
     }
 
     #[inline(always)]
@@ -277,13 +291,22 @@ impl NodeLanes for Avx2 {
     #[inline(always)]
     unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
         unsafe {
-            let [Self(x), Self(y), Self(z)] = value;
-            let xy01 = _mm256_unpacklo_ps(x, y);
-            let xy23 = _mm256_unpackhi_ps(x, y);
-            add_rows(nodes, index, 0, _mm256_shuffle_ps(xy01, z, 0x04));
-            add_rows(nodes, index, 1, _mm256_shuffle_ps(xy01, z, 0x5E));
-            add_rows(nodes, index, 2, _mm256_shuffle_ps(xy23, z, 0xA4));
-            add_rows(nodes, index, 3, _mm256_shuffle_ps(xy23, z, 0xFE));
+            for (i, row) in forces(value).into_iter().enumerate() {
+                add_rows(nodes, index, i, row);
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_add_in_order(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
+        unsafe {
+            let rows = forces(value);
+            for (i, row) in rows.into_iter().enumerate() {
+                add_row(nodes, *index.add(i), _mm256_castps256_ps128(row));
+            }
+            for (i, row) in rows.into_iter().enumerate() {
+                add_row(nodes, *index.add(4 + i), _mm256_extractf128_ps(row, 1));
+            }
         }
     }
 }

@@ -5,7 +5,7 @@
 )]
 
 use super::avx2::{add_row, row};
-use super::{CUBE_ROOT_GUESS, DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF};
+use super::{DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF};
 use core::arch::x86_64::*;
 
 /// Sixteen f32.
@@ -60,6 +60,7 @@ unsafe fn add_rows(nodes: *mut [f32; 4], index: *const u16, first: usize, value:
 // SAFETY (all functions): the traits' contract, AVX-512 enabled in the caller.
 impl Lanes for Avx512 {
     const COUNT: usize = 16;
+    const FUSED: bool = true;
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
@@ -250,16 +251,13 @@ impl DenseLanes for Avx512 {
 // SAFETY (all functions): the traits' contract, AVX-512 enabled in the caller.
 impl NodeLanes for Avx512 {
     #[inline(always)]
-    unsafe fn inverse_cube_root_guess(self) -> Self {
-        unsafe {
-            let bits = _mm512_cvtepi32_ps(_mm512_castps_si512(self.0));
-            let guess = _mm512_fnmadd_ps(
-                bits,
-                _mm512_set1_ps(1.0 / 3.0),
-                _mm512_set1_ps(CUBE_ROOT_GUESS),
-            );
-            Self(_mm512_castsi512_ps(_mm512_cvttps_epi32(guess)))
-        }
+    unsafe fn bits_as_numbers(self) -> Self {
+        unsafe { Self(_mm512_cvtepi32_ps(_mm512_castps_si512(self.0))) }
+    }
+
+    #[inline(always)]
+    unsafe fn numbers_as_bits(self) -> Self {
+        unsafe { Self(_mm512_castsi512_ps(_mm512_cvttps_epi32(self.0))) }
     }
 
     #[inline(always)]

@@ -4,6 +4,7 @@
 //!
 //! REQ-015: The host's floating-point environment is the same after a call, and a host that traps exceptions may call.
 
+use crate::Isa;
 use std::marker::PhantomData;
 
 /// A saved mode. It must be dropped on the thread that made it, hence it is not `Send`.
@@ -50,6 +51,22 @@ impl FlushToZero {
         Self {
             _saved: Saved::change(|word| masked(word) | FLUSH_BITS),
         }
+    }
+
+    /// [`FlushToZero::of`] a portable set, for what is computed before the first step; none for others.
+    pub fn of_portable(isa: Isa) -> Option<Self> {
+        isa.is_portable().then(|| Self::of(isa))
+    }
+
+    /// The mode of the kernels of `isa`. Portable ones keep denormals, since some machines cannot flush them and others do so before or after
+    /// they round, and they round to nearest whatever the host does.
+    pub fn of(isa: Isa) -> Self {
+        if isa.is_portable() {
+            return Self {
+                _saved: Saved::change(|_| masked(0)),
+            };
+        }
+        Self::enter()
     }
 }
 

@@ -277,8 +277,9 @@ mod tests {
     fn numbers_split_and_lanes_are_chosen() {
         // SAFETY: plain arrays.
         unsafe {
-            let [rest, power] = Scalar::splat(-12.0)
-                .below(Scalar::splat(0.0), Scalar::splat(12.0), Scalar::splat(1.0))
+            let number = <Scalar>::splat;
+            let [rest, power] = number(-12.0)
+                .below(number(0.0), number(12.0), number(1.0))
                 .split();
             let mut out = [0.0; WIDTH];
             rest.store(out.as_mut_ptr());

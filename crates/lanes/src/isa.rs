@@ -6,6 +6,10 @@ use std::sync::OnceLock;
 /// An instruction set that the kernels are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Isa {
+    /// What [`Isa::Portable`] computes, in plain Rust: for x86-64 processors without AVX2, and for comparisons.
+    PortableScalar,
+    /// Eight lanes and no fused multiply-add, by the instructions that are there: the same bits on every machine.
+    Portable,
     /// Plain Rust: the readable reference, right everywhere.
     Scalar,
     /// 128-bit SIMD of WebAssembly, for which a module is compiled or not.
@@ -23,10 +27,18 @@ static BEST: OnceLock<Isa> = OnceLock::new();
 
 impl Isa {
     /// Every set, slowest first.
-    const ALL: [Isa; 5] = [Isa::Scalar, Isa::Simd128, Isa::Neon, Isa::Avx2, Isa::Avx512];
+    const ALL: [Isa; 7] = [
+        Isa::PortableScalar,
+        Isa::Portable,
+        Isa::Scalar,
+        Isa::Simd128,
+        Isa::Neon,
+        Isa::Avx2,
+        Isa::Avx512,
+    ];
 
     /// The best of this machine. The environment variable `UPT_ISA` (`scalar`, `neon`, `avx2`,
-    /// `avx512`, `simd128`) lowers it, for comparisons; a set that the machine lacks is ignored.
+    /// `avx512`, `simd128`, `portable`, `portable-scalar`) lowers it, for comparisons; a set that the machine lacks is ignored.
     pub fn detect() -> Self {
         *BEST.get_or_init(|| {
             let asked = std::env::var("UPT_ISA").ok().and_then(|s| Self::parse(&s));
@@ -35,6 +47,23 @@ impl Isa {
                 _ => Self::available().last().copied().unwrap_or(Isa::Scalar),
             }
         })
+    }
+
+    /// The set for the same bits on every machine: [`Isa::Portable`], or [`Isa::PortableScalar`] where the machine lacks that or `UPT_ISA`
+    /// is `scalar`.
+    pub fn portable() -> Self {
+        match Isa::detect() {
+            Isa::Scalar | Isa::PortableScalar if Isa::PortableScalar.is_available() => {
+                Isa::PortableScalar
+            }
+            _ if Isa::Portable.is_available() => Isa::Portable,
+            _ => Isa::PortableScalar,
+        }
+    }
+
+    /// Whether its bits are those of every machine.
+    pub fn is_portable(self) -> bool {
+        matches!(self, Isa::Portable | Isa::PortableScalar)
     }
 
     /// Makes this set the one that is found, for hosts without an environment; false where the machine lacks it, or another was found
@@ -53,6 +82,11 @@ impl Isa {
     pub fn is_available(self) -> bool {
         match self {
             Isa::Scalar => true,
+            // Elsewhere there are always lanes.
+            Isa::PortableScalar => !crate::HAS_LANES,
+            Isa::Portable => {
+                crate::HAS_LANES || cfg!(target_arch = "x86_64") && Isa::Avx2.is_available()
+            }
             Isa::Simd128 => cfg!(all(target_arch = "wasm32", target_feature = "simd128")),
             #[cfg(target_arch = "aarch64")]
             Isa::Neon => std::arch::is_aarch64_feature_detected!("neon"),
@@ -90,6 +124,8 @@ impl Isa {
     /// The name in statistics and in `UPT_ISA`.
     pub fn name(self) -> &'static str {
         match self {
+            Isa::PortableScalar => "portable-scalar",
+            Isa::Portable => "portable",
             Isa::Scalar => "scalar",
             Isa::Simd128 => "simd128",
             Isa::Neon => "neon",
@@ -107,7 +143,7 @@ impl Isa {
 }
 
 /// Defines `fn name(isa, args..)`: the scalar function for `Isa::Scalar`, else `body::<Lanes>`
-/// compiled with the instruction set's features. An `Isa` that the machine lacks takes the scalar
+/// compiled with the instruction set's features, and for the portable ones `body` in any case. An `Isa` that the machine lacks takes a scalar
 /// path, so the function is safe to call with any value.
 #[macro_export]
 macro_rules! by_isa {
@@ -132,7 +168,28 @@ macro_rules! by_isa {
                 // SAFETY: the features of these lanes are enabled here.
                 unsafe { $body::<$crate::Neon>($($arg),*) }
             }
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2,fma,f16c")]
+            fn portable($($arg: $ty),*) {
+                // SAFETY: the features of these lanes are enabled here.
+                unsafe { $body::<$crate::Portable>($($arg),*) }
+            }
+            #[cfg(target_arch = "aarch64")]
+            #[target_feature(enable = "neon")]
+            fn portable($($arg: $ty),*) {
+                // SAFETY: the features of these lanes are enabled here.
+                unsafe { $body::<$crate::Portable>($($arg),*) }
+            }
             match isa {
+                #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+                // SAFETY: the machine has the features.
+                $crate::Isa::Portable if isa.is_available() => unsafe { portable($($arg),*) },
+                #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+                // SAFETY: the module is compiled with the feature.
+                $crate::Isa::Portable => unsafe { $body::<$crate::Portable>($($arg),*) },
+                #[cfg(not(any(target_arch = "aarch64", all(target_arch = "wasm32", target_feature = "simd128"))))]
+                // SAFETY: plain arrays.
+                $crate::Isa::Portable | $crate::Isa::PortableScalar => unsafe { $body::<$crate::Scalar<8>>($($arg),*) },
                 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
                 // SAFETY: the module is compiled with the feature.
                 $crate::Isa::Simd128 => unsafe { $body::<$crate::Simd128>($($arg),*) },
@@ -163,5 +220,6 @@ mod tests {
             assert_eq!(Isa::parse(isa.name()), Some(isa));
         }
         assert_eq!(Isa::parse("sse9"), None);
+        assert!(Isa::portable().is_available() && Isa::portable().is_portable());
     }
 }

@@ -5,6 +5,9 @@
 //! elements of a mesh need. [`Isa`] chooses at run time, and
 //! [`by_isa!`] writes the function that does.
 //!
+//! Sets differ in rounding: in the lanes of a sum, and in multiply-adds that are rounded once. [`Isa::Portable`] has eight lanes and
+//! rounds twice on every machine ([`Pair`], [`Plain`]), for the same bits everywhere.
+//!
 //! Every function of the traits is unsafe for one reason: the instruction set must be enabled in the function that it is
 //! inlined into, and pointers must be valid for the lanes that they name.
 
@@ -20,6 +23,8 @@ mod isa;
 mod neon;
 #[cfg(target_arch = "aarch64")]
 mod neon_four;
+mod pair;
+mod plain;
 mod scalar;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod simd128;
@@ -36,11 +41,29 @@ pub use isa::Isa;
 pub use neon::Neon;
 #[cfg(target_arch = "aarch64")]
 pub use neon_four::NeonFour;
+pub use pair::Pair;
+pub use plain::Plain;
 pub use scalar::Scalar;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 pub use simd128::Simd128;
 pub(crate) use traits::ROOT_OF_HALF;
 pub use traits::{CUBE_ROOT_GUESS, DenseLanes, FunctionLanes, Lanes, NodeLanes, WIDTH};
+
+/// Lanes of [`Isa::Portable`]: eight, and no fused multiply-add.
+#[cfg(target_arch = "x86_64")]
+pub type Portable = Plain<Avx2>;
+/// Lanes of [`Isa::Portable`]: eight, and no fused multiply-add.
+#[cfg(target_arch = "aarch64")]
+pub type Portable = Plain<Pair<Neon>>;
+/// Lanes of [`Isa::Portable`]: eight, and no fused multiply-add.
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+pub type Portable = Pair<Simd128>;
+
+/// Whether every machine of this target has vector lanes, without a look at run time.
+const HAS_LANES: bool = cfg!(any(
+    target_arch = "aarch64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+));
 
 /// Asks for a value's cache lines; the pointer may be beyond any allocation.
 #[inline(always)]

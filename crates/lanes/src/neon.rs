@@ -4,7 +4,7 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::{DenseLanes, FunctionLanes, Lanes, ROOT_OF_HALF};
+use super::{DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF};
 use core::arch::aarch64::*;
 
 /// Four f32.
@@ -31,9 +31,27 @@ pub(super) unsafe fn scale_by_power(x: float32x4_t, exponent: float32x4_t) -> fl
     }
 }
 
+/// Transposes four rows `[x y z w]` to columns, and back.
+#[inline(always)]
+pub(super) unsafe fn transpose(rows: [float32x4_t; 4]) -> [float32x4_t; 4] {
+    unsafe {
+        let a = vreinterpretq_f64_f32(vtrn1q_f32(rows[0], rows[1]));
+        let b = vreinterpretq_f64_f32(vtrn2q_f32(rows[0], rows[1]));
+        let c = vreinterpretq_f64_f32(vtrn1q_f32(rows[2], rows[3]));
+        let d = vreinterpretq_f64_f32(vtrn2q_f32(rows[2], rows[3]));
+        [
+            vreinterpretq_f32_f64(vtrn1q_f64(a, c)),
+            vreinterpretq_f32_f64(vtrn1q_f64(b, d)),
+            vreinterpretq_f32_f64(vtrn2q_f64(a, c)),
+            vreinterpretq_f32_f64(vtrn2q_f64(b, d)),
+        ]
+    }
+}
+
 // SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
 impl Lanes for Neon {
     const COUNT: usize = 4;
+    const FUSED: bool = true;
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
@@ -82,12 +100,12 @@ impl Lanes for Neon {
 
     #[inline(always)]
     unsafe fn min(self, other: Self) -> Self {
-        unsafe { Self(vminq_f32(self.0, other.0)) }
+        unsafe { Self(vbslq_f32(vcltq_f32(other.0, self.0), other.0, self.0)) }
     }
 
     #[inline(always)]
     unsafe fn max(self, other: Self) -> Self {
-        unsafe { Self(vmaxq_f32(self.0, other.0)) }
+        unsafe { Self(vbslq_f32(vcgtq_f32(other.0, self.0), other.0, self.0)) }
     }
 }
 
@@ -188,6 +206,49 @@ impl DenseLanes for Neon {
             vst1q_f32(to.add(stride), vreinterpretq_f32_f64(vtrn1q_f64(b, d)));
             vst1q_f32(to.add(2 * stride), vreinterpretq_f32_f64(vtrn2q_f64(a, c)));
             vst1q_f32(to.add(3 * stride), vreinterpretq_f32_f64(vtrn2q_f64(b, d)));
+        }
+    }
+}
+
+// SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
+impl NodeLanes for Neon {
+    #[inline(always)]
+    unsafe fn bits_as_numbers(self) -> Self {
+        unsafe { Self(vcvtq_f32_s32(vreinterpretq_s32_f32(self.0))) }
+    }
+
+    #[inline(always)]
+    unsafe fn numbers_as_bits(self) -> Self {
+        unsafe { Self(vreinterpretq_f32_s32(vcvtq_s32_f32(self.0))) }
+    }
+
+    #[inline(always)]
+    unsafe fn fourth(self) -> Self {
+        unsafe { Self(vdupq_laneq_f32::<3>(self.0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
+        unsafe {
+            let nodes = nodes.cast::<f64>();
+            let mut rows = [vdupq_n_f32(0.0); 4];
+            for (i, row) in rows.iter_mut().enumerate() {
+                *row = vld1q_f32(nodes.add(*index.add(i) as usize).cast());
+            }
+            let [x, y, z, w] = transpose(rows);
+            [Self(x), Self(y), Self(z), Self(w)]
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
+        unsafe {
+            let nodes = nodes.cast::<f64>();
+            let rows = transpose([value[0].0, value[1].0, value[2].0, value[2].0]);
+            for (i, row) in rows.into_iter().enumerate() {
+                let target: *mut f32 = nodes.add(*index.add(i) as usize).cast();
+                vst1q_f32(target, vaddq_f32(vld1q_f32(target), row));
+            }
         }
     }
 }

@@ -4,34 +4,18 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::neon::{scale_by_power, split};
-use super::{CUBE_ROOT_GUESS, FunctionLanes, Lanes, NodeLanes, WIDTH};
+use super::neon::{scale_by_power, split, transpose};
+use super::{FunctionLanes, Lanes, NodeLanes, WIDTH};
 use core::arch::aarch64::*;
 
 /// Sixteen f32 in four registers.
 #[derive(Clone, Copy)]
 pub struct NeonFour([float32x4_t; 4]);
 
-/// Transposes four rows `[x y z w]` to columns, and back.
-#[inline(always)]
-unsafe fn transpose(rows: [float32x4_t; 4]) -> [float32x4_t; 4] {
-    unsafe {
-        let a = vreinterpretq_f64_f32(vtrn1q_f32(rows[0], rows[1]));
-        let b = vreinterpretq_f64_f32(vtrn2q_f32(rows[0], rows[1]));
-        let c = vreinterpretq_f64_f32(vtrn1q_f32(rows[2], rows[3]));
-        let d = vreinterpretq_f64_f32(vtrn2q_f32(rows[2], rows[3]));
-        [
-            vreinterpretq_f32_f64(vtrn1q_f64(a, c)),
-            vreinterpretq_f32_f64(vtrn1q_f64(b, d)),
-            vreinterpretq_f32_f64(vtrn2q_f64(a, c)),
-            vreinterpretq_f32_f64(vtrn2q_f64(b, d)),
-        ]
-    }
-}
-
 // SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
 impl Lanes for NeonFour {
     const COUNT: usize = WIDTH;
+    const FUSED: bool = true;
 
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
@@ -217,16 +201,21 @@ impl FunctionLanes for NeonFour {
 // SAFETY (all functions): the traits' contract; NEON is part of every AArch64 target.
 impl NodeLanes for NeonFour {
     #[inline(always)]
-    unsafe fn inverse_cube_root_guess(self) -> Self {
-        unsafe {
-            let mut guess = self.0;
-            for part in &mut guess {
-                let bits = vcvtq_f32_s32(vreinterpretq_s32_f32(*part));
-                let value = vfmsq_f32(vdupq_n_f32(CUBE_ROOT_GUESS), bits, vdupq_n_f32(1.0 / 3.0));
-                *part = vreinterpretq_f32_s32(vcvtq_s32_f32(value));
-            }
-            Self(guess)
+    unsafe fn bits_as_numbers(self) -> Self {
+        let mut parts = self.0;
+        for part in &mut parts {
+            unsafe { *part = vcvtq_f32_s32(vreinterpretq_s32_f32(*part)) }
         }
+        Self(parts)
+    }
+
+    #[inline(always)]
+    unsafe fn numbers_as_bits(self) -> Self {
+        let mut parts = self.0;
+        for part in &mut parts {
+            unsafe { *part = vreinterpretq_f32_s32(vcvtq_s32_f32(*part)) }
+        }
+        Self(parts)
     }
 
     #[inline(always)]

@@ -4,13 +4,13 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
-use super::{CUBE_ROOT_GUESS, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF, WIDTH};
+use super::{DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF, WIDTH};
 
-/// Sixteen f32 in an array.
+/// `N` f32 in an array.
 #[derive(Clone, Copy)]
-pub struct Scalar([f32; WIDTH]);
+pub struct Scalar<const N: usize = WIDTH>([f32; N]);
 
-impl Scalar {
+impl<const N: usize> Scalar<N> {
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
@@ -18,22 +18,23 @@ impl Scalar {
 }
 
 // SAFETY (all functions): no instruction set beyond the target's baseline is used.
-impl Lanes for Scalar {
-    const COUNT: usize = WIDTH;
+impl<const N: usize> Lanes for Scalar<N> {
+    const COUNT: usize = N;
+    const FUSED: bool = false;
 
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
-        Self([value; WIDTH])
+        Self([value; N])
     }
 
     #[inline(always)]
     unsafe fn load(source: *const f32) -> Self {
-        Self(unsafe { source.cast::<[f32; WIDTH]>().read_unaligned() })
+        Self(unsafe { source.cast::<[f32; N]>().read_unaligned() })
     }
 
     #[inline(always)]
     unsafe fn store(self, target: *mut f32) {
-        unsafe { target.cast::<[f32; WIDTH]>().write_unaligned(self.0) }
+        unsafe { target.cast::<[f32; N]>().write_unaligned(self.0) }
     }
 
     #[inline(always)]
@@ -78,7 +79,7 @@ impl Lanes for Scalar {
 }
 
 // SAFETY (all functions): no instruction set beyond the target's baseline is used.
-impl FunctionLanes for Scalar {
+impl<const N: usize> FunctionLanes for Scalar<N> {
     #[inline(always)]
     unsafe fn sqrt(self) -> Self {
         Self(self.0.map(f32::sqrt))
@@ -120,18 +121,64 @@ impl FunctionLanes for Scalar {
 
     #[inline(always)]
     unsafe fn all_below(self, limit: Self) -> bool {
-        (0..WIDTH).all(|i| self.0[i] < limit.0[i])
+        (0..N).all(|i| self.0[i] < limit.0[i])
     }
 }
 
 // SAFETY (all functions): no instruction set beyond the target's baseline is used.
-impl NodeLanes for Scalar {
+impl<const N: usize> DenseLanes for Scalar<N> {
     #[inline(always)]
-    unsafe fn inverse_cube_root_guess(self) -> Self {
-        Self(self.0.map(|x| {
-            let bits = CUBE_ROOT_GUESS - x.to_bits() as i32 as f32 * (1.0 / 3.0);
-            f32::from_bits(bits as i32 as u32)
-        }))
+    unsafe fn load_part(from: *const f32, count: usize) -> Self {
+        let mut lanes = [0.0; N];
+        unsafe { core::ptr::copy_nonoverlapping(from, lanes.as_mut_ptr(), count) };
+        Self(lanes)
+    }
+
+    #[inline(always)]
+    unsafe fn store_part(self, to: *mut f32, count: usize) {
+        unsafe { core::ptr::copy_nonoverlapping(self.0.as_ptr(), to, count) }
+    }
+
+    #[inline(always)]
+    unsafe fn load_f16(from: *const half::f16) -> Self {
+        Self(std::array::from_fn(|i| unsafe { *from.add(i) }.to_f32()))
+    }
+
+    /// Neighbours first, then pairs of them, and so on: `((0 + 1) + (2 + 3)) + ((4 + 5) + (6 + 7))`.
+    #[inline(always)]
+    unsafe fn sums(four: [Self; 4]) -> [f32; 4] {
+        four.map(|Self(mut lanes)| {
+            let mut count = N;
+            while count > 1 {
+                count /= 2;
+                for i in 0..count {
+                    lanes[i] = lanes[2 * i] + lanes[2 * i + 1];
+                }
+            }
+            lanes[0]
+        })
+    }
+
+    #[inline(always)]
+    unsafe fn transpose(from: *const f32, row_offset: &[usize], to: *mut f32, stride: usize) {
+        for (i, offset) in row_offset[..N].iter().enumerate() {
+            for j in 0..N {
+                unsafe { *to.add(j * stride + i) = *from.add(offset + j) };
+            }
+        }
+    }
+}
+
+// SAFETY (all functions): no instruction set beyond the target's baseline is used.
+impl<const N: usize> NodeLanes for Scalar<N> {
+    #[inline(always)]
+    unsafe fn bits_as_numbers(self) -> Self {
+        Self(self.0.map(|x| x.to_bits() as i32 as f32))
+    }
+
+    #[inline(always)]
+    unsafe fn numbers_as_bits(self) -> Self {
+        Self(self.0.map(|x| f32::from_bits(x as i32 as u32)))
     }
 
     #[inline(always)]
@@ -141,14 +188,14 @@ impl NodeLanes for Scalar {
 
     #[inline(always)]
     unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
-        let values: [[f32; 4]; WIDTH] =
+        let values: [[f32; 4]; N] =
             std::array::from_fn(|i| unsafe { *nodes.add(*index.add(i) as usize / 2) });
         [0, 1, 2, 3].map(|axis| Self(std::array::from_fn(|i| values[i][axis])))
     }
 
     #[inline(always)]
     unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
-        for i in 0..WIDTH {
+        for i in 0..N {
             let node = unsafe { &mut *nodes.add(*index.add(i) as usize / 2) };
             for axis in 0..3 {
                 node[axis] += value[axis].0[i];

@@ -4,7 +4,7 @@
     reason = "one contract for all: the module is compiled with the feature, and pointers hold what the shapes say"
 )]
 
-use super::{CUBE_ROOT_GUESS, DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF};
+use super::{DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF};
 use core::arch::wasm32::*;
 
 /// Four f32.
@@ -29,6 +29,7 @@ fn transposed(rows: [v128; 4]) -> [v128; 4] {
 // SAFETY (all functions): the traits' contract; the module is compiled with the feature.
 impl Lanes for Simd128 {
     const COUNT: usize = 4;
+    const FUSED: bool = false;
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
@@ -171,10 +172,13 @@ impl DenseLanes for Simd128 {
 // SAFETY (all functions): the traits' contract; the module is compiled with the feature.
 impl NodeLanes for Simd128 {
     #[inline(always)]
-    unsafe fn inverse_cube_root_guess(self) -> Self {
-        let third = f32x4_mul(f32x4_convert_i32x4(self.0), f32x4_splat(1.0 / 3.0));
-        let value = f32x4_sub(f32x4_splat(CUBE_ROOT_GUESS), third);
-        Self(i32x4_trunc_sat_f32x4(value))
+    unsafe fn bits_as_numbers(self) -> Self {
+        Self(f32x4_convert_i32x4(self.0))
+    }
+
+    #[inline(always)]
+    unsafe fn numbers_as_bits(self) -> Self {
+        Self(i32x4_trunc_sat_f32x4(self.0))
     }
 
     #[inline(always)]

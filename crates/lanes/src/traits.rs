@@ -18,6 +18,8 @@ pub(crate) const ROOT_OF_HALF: i32 = 0x3F35_04F3;
 pub trait Lanes: Copy {
     /// Lanes of a register.
     const COUNT: usize;
+    /// Whether a multiply-add is rounded once.
+    const FUSED: bool;
 
     unsafe fn splat(x: f32) -> Self;
     unsafe fn load(from: *const f32) -> Self;
@@ -78,18 +80,36 @@ pub trait DenseLanes: FunctionLanes {
 /// a tetrahedron stay in registers.
 ///
 /// Nodes are `[x, y, z, w]` in memory. A gather loads one corner of each of `COUNT` elements and transposes to four vectors; a
-/// scatter adds back in element order, so corners that share a node are summed one after the other. Indices count half nodes
+/// scatter adds back in one order of the elements, so corners that share a node are summed one after the other. Indices count half nodes
 /// (8 bytes): the largest step that x86 addressing scales by itself.
 ///
 /// # Safety
 /// As [`Lanes`], for the nodes that the indices name.
 #[allow(clippy::missing_safety_doc)]
 pub trait NodeLanes: FunctionLanes {
+    /// The bits of each lane, an integer, as a number.
+    unsafe fn bits_as_numbers(self) -> Self;
+    /// The whole part of each lane as bits.
+    unsafe fn numbers_as_bits(self) -> Self;
     /// First guess of `self^(-1/3)` for positive values, within 4 %.
-    unsafe fn inverse_cube_root_guess(self) -> Self;
+    #[inline(always)]
+    unsafe fn inverse_cube_root_guess(self) -> Self {
+        // SAFETY: the caller's.
+        unsafe {
+            let bits = self.bits_as_numbers();
+            bits.neg_mul_add(Self::splat(1.0 / 3.0), Self::splat(CUBE_ROOT_GUESS))
+                .numbers_as_bits()
+        }
+    }
     /// Of nodes that follow each other in memory, their fourth components in place of all four.
     unsafe fn fourth(self) -> Self;
     unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4];
     /// Adds three components; the fourth is left with anything.
     unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]);
+    /// The same, one element after another.
+    #[inline(always)]
+    unsafe fn scatter_add_in_order(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
+        // SAFETY: the caller's.
+        unsafe { Self::scatter_add(nodes, index, value) }
+    }
 }

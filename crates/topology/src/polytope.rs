@@ -187,8 +187,8 @@ fn around(points: &mut [Weights], distance: &Weights, sign: f64) {
     let angle = |at: &Weights| {
         let off = minus(place(at), centre);
         // Components along axes that need not be of unit length keep the order.
-        (dot(off, second) / dot(second, second).sqrt())
-            .atan2(dot(off, first) / dot(first, first).sqrt())
+        let along = |axis| dot(off, axis) / dot(axis, axis).sqrt();
+        libm::atan2(along(second), along(first))
     };
     points.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
 }

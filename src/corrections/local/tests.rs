@@ -34,7 +34,7 @@ impl Bench {
         let entry = manifest.prior.as_ref().unwrap();
         let prior = PriorTable::open(&files, entry, &mesh).unwrap();
         Bench {
-            corrections: Corrections::open(&files, &mesh, Some(&prior)).unwrap(),
+            corrections: Corrections::open(&files, &mesh, Some(&prior), Isa::detect()).unwrap(),
             pool: Pool::new(1).unwrap(),
             contact: ContactSet::default(),
             zero: vec![0.0; 3 * mesh.node_count()],

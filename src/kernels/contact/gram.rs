@@ -17,7 +17,7 @@ fn whiten_rows_scalar(u: &[f64], columns: usize, z: &mut [f64]) {
 
 by_isa! { pub(super) fn whiten_rows(u: &[f64], columns: usize, z: &mut [f64]) = whiten_rows_body, whiten_rows_scalar; }
 
-/// The same, by rows of `u`. Only the compiler's vector instructions depend on `V`.
+/// The same, by rows of `u`. Of `V` only the rounding of a multiply-add and the compiler's vector instructions depend.
 #[inline(always)]
 unsafe fn whiten_rows_body<V: DenseLanes>(u: &[f64], columns: usize, z: &mut [f64]) {
     let n = z.len() / columns.max(1);
@@ -28,7 +28,7 @@ unsafe fn whiten_rows_body<V: DenseLanes>(u: &[f64], columns: usize, z: &mut [f6
         row.iter_mut().for_each(|x| *x *= inverse);
         for (to, &factor) in below.chunks_exact_mut(columns).zip(&u[k * n + k + 1..]) {
             for (to, &x) in to.iter_mut().zip(&*row) {
-                *to = fused(-factor, x, *to);
+                *to = fused::<V>(-factor, x, *to);
             }
         }
     }
@@ -63,15 +63,15 @@ unsafe fn gram_body<V: DenseLanes>(z: &[f64], columns: usize, scale: f64, upper:
         let rows = &mut upper[i * n..][..4 * n];
         let mut j = i;
         while j + 16 <= n {
-            subtract_scaled_tile::<4, 16>(z, rows, n, i, j, scale);
+            subtract_scaled_tile::<V, 4, 16>(z, rows, n, i, j, scale);
             j += 16;
         }
         while j + 4 <= n {
-            subtract_scaled_tile::<4, 4>(z, rows, n, i, j, scale);
+            subtract_scaled_tile::<V, 4, 4>(z, rows, n, i, j, scale);
             j += 4;
         }
         while j < n {
-            subtract_scaled_tile::<4, 1>(z, rows, n, i, j, scale);
+            subtract_scaled_tile::<V, 4, 1>(z, rows, n, i, j, scale);
             j += 1;
         }
         i += 4;
@@ -79,7 +79,7 @@ unsafe fn gram_body<V: DenseLanes>(z: &[f64], columns: usize, scale: f64, upper:
     while i < n {
         let rows = &mut upper[i * n..][..n];
         for j in i..n {
-            subtract_scaled_tile::<1, 1>(z, rows, n, i, j, scale);
+            subtract_scaled_tile::<V, 1, 1>(z, rows, n, i, j, scale);
         }
         i += 1;
     }
@@ -87,7 +87,7 @@ unsafe fn gram_body<V: DenseLanes>(z: &[f64], columns: usize, scale: f64, upper:
 
 /// `rows[r][j + c] -= scale sum_k block[k][i + r] * block[k][j + c]` for an `R x C` tile in registers.
 #[inline(always)]
-pub(super) fn subtract_scaled_tile<const R: usize, const C: usize>(
+pub(super) fn subtract_scaled_tile<V: DenseLanes, const R: usize, const C: usize>(
     block: &[f64],
     rows: &mut [f64],
     n: usize,
@@ -101,7 +101,7 @@ pub(super) fn subtract_scaled_tile<const R: usize, const C: usize>(
         let right: &[f64; C] = row[j..j + C].try_into().expect("C numbers");
         for r in 0..R {
             for c in 0..C {
-                sum[r][c] = fused(left[r], right[c], sum[r][c]);
+                sum[r][c] = fused::<V>(left[r], right[c], sum[r][c]);
             }
         }
     }

@@ -38,13 +38,13 @@ pub(super) fn factor_upper_scalar(a: &mut [f64], n: usize, positive: &mut bool) 
 
 by_isa! { pub(super) fn factor_upper(a: &mut [f64], n: usize, positive: &mut bool) = factor_upper_body, factor_upper_scalar; }
 
-/// The same, by blocks of rows. Only the compiler's vector instructions depend on `V`.
+/// The same, by blocks of rows. Of `V` only the rounding of a multiply-add and the compiler's vector instructions depend.
 #[inline(always)]
 unsafe fn factor_upper_body<V: DenseLanes>(a: &mut [f64], n: usize, positive: &mut bool) {
     let mut start = 0;
     while start < n {
         let end = (start + BLOCK).min(n);
-        if !factor_rows(a, n, start, end) {
+        if !factor_rows::<V>(a, n, start, end) {
             *positive = false;
             return;
         }
@@ -56,15 +56,15 @@ unsafe fn factor_upper_body<V: DenseLanes>(a: &mut [f64], n: usize, positive: &m
             // The first tile starts on the diagonal: what it writes below is never read.
             let mut j = i;
             while j + 16 <= n {
-                subtract_tile::<4, 16>(block, rows, n, i, j);
+                subtract_tile::<V, 4, 16>(block, rows, n, i, j);
                 j += 16;
             }
             while j + 4 <= n {
-                subtract_tile::<4, 4>(block, rows, n, i, j);
+                subtract_tile::<V, 4, 4>(block, rows, n, i, j);
                 j += 4;
             }
             while j < n {
-                subtract_tile::<4, 1>(block, rows, n, i, j);
+                subtract_tile::<V, 4, 1>(block, rows, n, i, j);
                 j += 1;
             }
             i += 4;
@@ -72,7 +72,7 @@ unsafe fn factor_upper_body<V: DenseLanes>(a: &mut [f64], n: usize, positive: &m
         while i < n {
             let rows = &mut rest[(i - end) * n..][..n];
             for j in i..n {
-                subtract_tile::<1, 1>(block, rows, n, i, j);
+                subtract_tile::<V, 1, 1>(block, rows, n, i, j);
             }
             i += 1;
         }
@@ -82,7 +82,7 @@ unsafe fn factor_upper_body<V: DenseLanes>(a: &mut [f64], n: usize, positive: &m
 
 /// Factors rows `start..end`, whose earlier rows have been subtracted already.
 #[inline(always)]
-fn factor_rows(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
+fn factor_rows<V: DenseLanes>(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
     for k in start..end {
         let (above, below) = a.split_at_mut((k + 1) * n);
         let pivot = above[k * n + k];
@@ -97,7 +97,7 @@ fn factor_rows(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
             let factor = row[i];
             let to = &mut below[(i - k - 1) * n..][i..n];
             for (to, &x) in to.iter_mut().zip(&row[i..]) {
-                *to = fused(-factor, x, *to);
+                *to = fused::<V>(-factor, x, *to);
             }
         }
     }
@@ -106,14 +106,14 @@ fn factor_rows(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
 
 /// `rows[r][j + c] -= sum_k block[k][i + r] * block[k][j + c]` for an `R x C` tile in registers.
 #[inline(always)]
-fn subtract_tile<const R: usize, const C: usize>(
+fn subtract_tile<V: DenseLanes, const R: usize, const C: usize>(
     block: &[f64],
     rows: &mut [f64],
     n: usize,
     i: usize,
     j: usize,
 ) {
-    subtract_scaled_tile::<R, C>(block, rows, n, i, j, 1.0);
+    subtract_scaled_tile::<V, R, C>(block, rows, n, i, j, 1.0);
 }
 
 fn solve_upper_scalar(u: &[f64], x: &mut [f64]) {

@@ -15,7 +15,7 @@ pub(super) const MAX_NODES: usize = 64;
 pub(super) fn nodes(isa: Isa) -> usize {
     match isa {
         Isa::Avx512 => 48,
-        Isa::Avx2 => 16,
+        Isa::Avx2 | Isa::Portable | Isa::PortableScalar => 16,
         Isa::Neon | Isa::Simd128 => 8,
         Isa::Scalar => 16,
     }

@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-use lanes::flush::FlushToZero;
+use lanes::{FlushToZero, Isa};
 
 /// Looks of a worker that is kept awake for the next job, and of a caller for the end of one, before it sleeps: about 0.1 ms.
 pub const LOOKS: u32 = 2000;
@@ -99,8 +99,8 @@ impl Shared {
     }
 }
 
-pub fn worker_loop(shared: &Shared, worker: usize) {
-    let _flush = FlushToZero::enter();
+pub fn worker_loop(shared: &Shared, isa: Isa, worker: usize) {
+    let _mode = FlushToZero::of(isa);
     let (mut seen, mut looked) = (0, false);
     let mut state = shared.lock();
     loop {

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::{CoarseSpace, WHAT};
 use crate::error::Result;
-use crate::kernels::Isa;
 use crate::kernels::project::row_dots_in;
 use crate::memory;
 use crate::prior::PriorTable;
@@ -59,6 +58,7 @@ impl CoarseSpace {
                 false => Arc::default(),
             },
             keeps: true,
+            isa: self.isa,
         };
         space.take_off(lost)?;
         let added = &prior.contact_nodes[intact.contact_nodes.len()..];
@@ -118,7 +118,7 @@ impl CoarseSpace {
             q[range.clone()].fill(0.0);
             prior.add_row(node, [0, 1, 2].map(|k| f32::from(u8::from(k == axis))), q);
             let ranges = std::slice::from_ref(&range);
-            row_dots_in(Isa::detect(), modes, &self.rows, ranges, q, row);
+            row_dots_in(self.isa, modes, &self.rows, ranges, q, row);
         }
         q[range].fill(0.0);
     }

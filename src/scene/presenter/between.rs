@@ -113,8 +113,8 @@ impl Between {
                 velocity: field()?,
                 ..KnownStep::default()
             },
-            pool: Pool::new(1).map_err(|error| Error::Argument(error.to_string()))?,
-            isa: Isa::detect(),
+            pool: Pool::of(model.isa, 1).map_err(|error| Error::Argument(error.to_string()))?,
+            isa: model.isa,
             held,
             last: field()?,
             velocity: field()?,

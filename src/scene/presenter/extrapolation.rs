@@ -187,7 +187,7 @@ impl VelocityExtrapolation {
 /// The time that free tissue goes on for, s: the damping slows it.
 fn slowed(tau: f64, alpha: f64) -> f32 {
     match alpha > 0.0 {
-        true => (-(-alpha * tau).exp_m1() / alpha) as f32,
+        true => (-libm::expm1(-alpha * tau) / alpha) as f32,
         false => tau as f32,
     }
 }

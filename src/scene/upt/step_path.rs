@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::{Choice, UptEngine};
 use crate::error::Result;
-use crate::kernels::{Compute, Isa, Pool};
+use crate::kernels::{Compute, Pool};
 use crate::memory;
 use crate::model::{Model, UptModel, UptTables};
 use crate::options::{DecoderKernel, Precision, Provider, SceneOptions, StepPath};
@@ -118,7 +118,7 @@ impl Parts<'_> {
     /// Milliseconds of the network and of decoding every node, at rest.
     fn time(&self, engine: &mut UptEngine, field: &mut [f32]) -> Result<f64> {
         let compute = Compute {
-            isa: Isa::detect(),
+            isa: self.model.isa,
             pool: self.pool,
         };
         let nodes = memory::collected(self.node_count, 0..self.node_count as u32, "a timed step")?;

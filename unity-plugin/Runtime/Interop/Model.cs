@@ -13,12 +13,19 @@ namespace Upt.Interop
         /// <summary>Opens the bundle folder <paramref name="path"/> with the CPU provider and
         /// <paramref name="threads"/> threads (0: the library's default). Throws
         /// <see cref="UptException"/>, whose message names the file and field that is wrong.</summary>
-        public Model(string path, uint threads)
+        public Model(string path, uint threads) : this(path, threads, false)
+        {
+        }
+
+        /// <summary>The same; with <paramref name="portable"/> steps have the same bits on every
+        /// processor, for replays and lockstep (reduced bundles without a network).</summary>
+        public Model(string path, uint threads, bool portable)
         {
             Library.Verify();
             upt_model_options options = default(upt_model_options);
             options.struct_size = (uint)sizeof(upt_model_options);
             options.threads = threads;
+            options.portable = portable ? (byte)1 : (byte)0;
             IntPtr pointer = IntPtr.Zero;
             fixed (byte* bytes = Utf8.Encode(path, "path"))
             {

@@ -43,8 +43,8 @@ namespace Upt.Interop
         public byte cuda_graph;
         /// <summary>`UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`.</summary>
         public byte fallback;
-        /// <summary>Zero.</summary>
-        public byte reserved;
+        /// <summary>1: the same bits on every processor, for replays and lockstep; steps take longer. Reduced bundles without a network.</summary>
+        public byte portable;
         /// <summary>A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.</summary>
         public IntPtr user_stream;
     }

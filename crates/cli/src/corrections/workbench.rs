@@ -191,7 +191,7 @@ impl Workbench {
                 bundle.display()
             );
         };
-        let space = CoarseSpace::parse(&files.tensors(FILE)?, &self.prior)?;
+        let space = CoarseSpace::parse(&files.tensors(FILE)?, &self.prior, Isa::detect())?;
         let source = Source {
             mesh: &self.mesh,
             stiffness: &self.stiffness,

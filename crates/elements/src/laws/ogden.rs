@@ -88,7 +88,7 @@ impl Ogden {
     fn rise(&self, s: f64) -> f64 {
         let terms = self.terms.iter();
         terms
-            .map(|term| term.mu_pa * term.alpha * (term.alpha * s).min(CAP).exp())
+            .map(|term| term.mu_pa * term.alpha * libm::exp((term.alpha * s).min(CAP)))
             .sum::<f64>()
             / self.shear_pa()
     }

@@ -19,7 +19,7 @@ impl Stretches {
 
     /// Its derivative by `s`, `sum mu alpha phi'(alpha s)`.
     pub fn rise(&self, s: f64) -> f64 {
-        self.sum(|mu, alpha| mu * alpha * (alpha * s).min(self.cap).exp())
+        self.sum(|mu, alpha| mu * alpha * libm::exp((alpha * s).min(self.cap)))
     }
 
     /// `w` of three logarithms, whose sum is zero.
@@ -35,7 +35,7 @@ impl Stretches {
         let mut out = [0.0; 2];
         for term in self.terms.iter() {
             let p = 0.5 * term.alpha;
-            let c = term.mu_pa * (-p / 3.0 * log).exp();
+            let c = term.mu_pa * libm::exp(-p / 3.0 * log);
             let second = p * (p - 1.0) / 2.0;
             let third = second * (p - 2.0) / 3.0;
             let fourth = third * (p - 3.0) / 4.0;
@@ -54,9 +54,9 @@ impl Stretches {
 /// `phi(y) - 1`.
 fn phi_less_one(y: f64, cap: f64) -> f64 {
     if y > cap {
-        cap.exp() * (1.0 + y - cap) - 1.0
+        libm::exp(cap) * (1.0 + y - cap) - 1.0
     } else {
-        y.exp_m1()
+        libm::expm1(y)
     }
 }
 
@@ -64,8 +64,8 @@ fn phi_less_one(y: f64, cap: f64) -> f64 {
 fn integral(y: f64, cap: f64) -> f64 {
     if y > cap {
         let beyond = y - cap;
-        cap.exp_m1() + cap.exp() * beyond * (1.0 + 0.5 * beyond)
+        libm::expm1(cap) + libm::exp(cap) * beyond * (1.0 + 0.5 * beyond)
     } else {
-        y.exp_m1()
+        libm::expm1(y)
     }
 }
