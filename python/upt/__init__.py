@@ -62,6 +62,7 @@ from upt.instrument import Hull, Instrument
 from upt.loads import Loads, Support
 from upt.log import set_log
 from upt.model import Model
+from upt.replay import Recorder
 from upt.scene import Scene
 from upt.ties import Tie
 
@@ -112,6 +113,7 @@ __all__ = [
     "PanicError",
     "Precision",
     "Provider",
+    "Recorder",
     "RuntimeLibraryError",
     "Scene",
     "SceneOptions",

@@ -41,6 +41,7 @@ pub mod prior;
 pub mod progress;
 mod python;
 pub mod render;
+pub mod replay;
 pub mod rollout;
 pub mod runtime;
 pub mod setting;

@@ -12,7 +12,9 @@ use upt_cli::export;
 use upt_cli::left_out;
 #[cfg(feature = "linear")]
 use upt_cli::{check, corrections, make, modes, prior, validate};
-use upt_cli::{dataset, doctor, fit, loads, materials, mesh, rollout, runtime, simulate, view};
+use upt_cli::{
+    dataset, doctor, fit, loads, materials, mesh, replay, rollout, runtime, simulate, view,
+};
 
 /// Names what a build leaves out; `cargo xtask demo` builds without what it does not need.
 const VERSION: &str = match (cfg!(feature = "files"), cfg!(feature = "linear")) {
@@ -112,6 +114,8 @@ enum Command {
     Dataset(dataset::Options),
     /// Replay one contact through a bundle, with the paper's metrics.
     Rollout(rollout::Options),
+    /// Step through a recorded session again, and compare it to the bit.
+    Replay(replay::Options),
     /// Show a bundle in the browser: drag a tool, watch the tissue.
     View(view::Options),
     /// Print shell completions.
@@ -163,6 +167,7 @@ fn main() -> ExitCode {
         Command::Simulate(options) => simulate::run(&options),
         Command::Dataset(options) => dataset::run(&options),
         Command::Rollout(options) => rollout::run(&options),
+        Command::Replay(options) => replay::run(&options),
         Command::View(options) => view::run(&options),
         Command::Completions(options) => completions::run::<Arguments>(&options),
         Command::Reference => reference::run::<Arguments>(),
