@@ -142,13 +142,13 @@ impl Relaxation {
 impl Branch {
     /// `e = exp(-h / tau)`.
     pub fn decay(&self, h: f64) -> f64 {
-        (-h / self.tau_s).exp()
+        libm::exp(-h / self.tau_s)
     }
 
     /// `g b`: what it takes of a change of the stress within `h` seconds.
     pub fn gain(&self, h: f64) -> f64 {
         let x = h / self.tau_s;
-        let mean = if x > 0.0 { -(-x).exp_m1() / x } else { 1.0 };
+        let mean = if x > 0.0 { -libm::expm1(-x) / x } else { 1.0 };
         self.share * mean
     }
 }
