@@ -1,5 +1,5 @@
-//! `upt-bindgen`: writes the bindings; `--check` only says whether they are up to date. `--stays` says what of the last release's ABI is gone
-//! or has changed, and `--release` writes the dump that a later `--stays` compares with.
+//! `upt-bindgen`: writes the bindings; `--check` only says whether they are up to date. `--release` writes the dump of the ABI that
+//! `tests/fresh.rs` compares later ones with.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -10,7 +10,6 @@ use upt_bindgen::{dump, source};
 fn main() -> Result<ExitCode> {
     let root = upt_bindgen::root();
     let good = match std::env::args().nth(1).as_deref() {
-        Some("--stays") => stays(&root)?,
         Some("--release") => release(&root)?,
         word => bindings(&root, word == Some("--check"))?,
     };
@@ -34,27 +33,6 @@ fn bindings(root: &Path, check: bool) -> Result<bool> {
         }
     }
     Ok(fresh)
-}
-
-/// False where something of the last release's ABI does not stand.
-fn stays(root: &Path) -> Result<bool> {
-    let old = std::fs::read_to_string(root.join(dump::PATH)).context(dump::PATH)?;
-    let faults = dump::broken(&old, &dump::write(&source::read(root)?)?);
-    for fault in &faults {
-        println!("{fault}");
-    }
-    match faults.len() {
-        0 => println!(
-            "the ABI of {} stands: {} lines",
-            dump::PATH,
-            old.lines().count()
-        ),
-        _ => println!(
-            "From 1.0 on this waits for the next major version. Before it: `cargo xtask header --release`, with a row in \
-             docs/reference/from-0.1-to-1.0.md"
-        ),
-    }
-    Ok(faults.is_empty())
 }
 
 fn release(root: &Path) -> Result<bool> {

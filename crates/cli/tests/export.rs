@@ -1,11 +1,11 @@
-//! `upt export` as a user calls it; its files are read by readers that this project did not write.
+//! `upt export` as a user calls it; its surfaces are read by readers that this project did not write. VTK reads its frames in
+//! `training/tests/test_vtk_export.py`.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use tissue::mesh::Mesh;
 use tissue::trajectory::Trajectory;
-use vtkio::model::{Attribute, DataSet, UnstructuredGridPiece};
 
 const MESH: &str = "tests/fixtures/box.mesh.safetensors";
 
@@ -71,73 +71,6 @@ impl Case {
             .map(|(p, u)| [0, 1, 2].map(|k| p[k] + u[k]))
             .collect()
     }
-}
-
-fn read_frame(path: &Path) -> UnstructuredGridPiece {
-    let DataSet::UnstructuredGrid { pieces, .. } = vtkio::Vtk::import(path).unwrap().data else {
-        panic!("{}: not an unstructured grid", path.display());
-    };
-    pieces[0].load_piece_data(None).unwrap()
-}
-
-fn point_data(piece: &UnstructuredGridPiece, name: &str) -> vtkio::IOBuffer {
-    let array = |attribute: &Attribute| match attribute {
-        Attribute::DataArray(array) if array.name == name => Some(array.data.clone()),
-        _ => None,
-    };
-    piece.data.point.iter().find_map(array).unwrap()
-}
-
-#[test]
-fn frames_are_listed_with_their_times_and_hold_the_deformed_body() {
-    let case = Case::new();
-    let out = case.path("paraview");
-    let output = case.export(MESH, &["--out", out.to_str().unwrap(), "--every", "40"]);
-    assert!(output.status.success(), "{output:?}");
-    let list = std::fs::read_to_string(out.join("trajectory.pvd")).unwrap();
-    let frames: Vec<usize> = (0..case.trajectory.frame_count()).step_by(40).collect();
-    assert!(frames.len() >= 4);
-    assert_eq!(list.matches("<DataSet").count(), frames.len());
-    let dt = case.trajectory.header.dt_s;
-    for frame in frames {
-        let file = format!("frame-{frame:05}.vtu");
-        let entry = format!(
-            "timestep=\"{}\" part=\"0\" file=\"{file}\"",
-            frame as f64 * dt
-        );
-        assert!(list.contains(&entry), "{entry} is not in {list}");
-        let piece = read_frame(&out.join(file));
-        let points: Vec<f32> = piece.points.clone().into_vec().unwrap();
-        assert_eq!(points, case.moved(frame).as_flattened());
-        assert_eq!(piece.cells.types.len(), case.mesh.tets.len());
-        let moved: Vec<f32> = point_data(&piece, "displacement").into_vec().unwrap();
-        assert_eq!(moved, case.trajectory.frame(frame).as_flattened());
-        let contact: Vec<u8> = point_data(&piece, "contact").into_vec().unwrap();
-        let touched = contact.iter().filter(|&&flag| flag == 1).count();
-        assert_eq!(touched, case.trajectory.contact(frame).0.len());
-    }
-}
-
-#[test]
-fn a_skin_at_rest_has_the_surface_only() {
-    let case = Case::new();
-    let out = case.path("skin");
-    let folder = out.to_str().unwrap();
-    let output = case.export(
-        MESH,
-        &["--out", folder, "--every", "80", "--skin", "--rest"],
-    );
-    assert!(output.status.success(), "{output:?}");
-    let piece = read_frame(&out.join("frame-00080.vtu"));
-    assert_eq!(piece.cells.types.len(), case.mesh.surface.len());
-    let mut nodes: Vec<u32> = case.mesh.surface.as_flattened().to_vec();
-    nodes.sort_unstable();
-    nodes.dedup();
-    let rest: Vec<[f32; 3]> = (nodes.iter())
-        .map(|&node| case.mesh.positions[node as usize])
-        .collect();
-    let points: Vec<f32> = piece.points.into_vec().unwrap();
-    assert_eq!(points, rest.as_flattened());
 }
 
 #[test]

@@ -26,14 +26,12 @@ impl Saved {
 
 impl Drop for Saved {
     fn drop(&mut self) {
-        #[cfg(any(test, feature = "raised"))]
         RAISED.with(|raised| raised.set(raised.get() | (read_mode() & STATUS_BITS)));
         // Status (exception) flags are part of the word on x86: the host's own are put back.
         write_mode(self.word);
     }
 }
 
-#[cfg(any(test, feature = "raised"))]
 thread_local! {
     /// Exceptions that computations of this thread have met, as bits of the mode word.
     pub static RAISED: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
@@ -103,9 +101,9 @@ fn masked(word: u64) -> u64 {
 }
 
 /// MXCSR: bits 0 to 5 say which exceptions were met. FPCR has none.
-#[cfg(all(any(test, feature = "raised"), target_arch = "x86_64"))]
+#[cfg(target_arch = "x86_64")]
 const STATUS_BITS: u64 = 0x3f;
-#[cfg(all(any(test, feature = "raised"), not(target_arch = "x86_64")))]
+#[cfg(not(target_arch = "x86_64"))]
 const STATUS_BITS: u64 = 0;
 
 /// MXCSR: bit 15 flush-to-zero, bit 6 denormals-are-zero.

@@ -1,9 +1,8 @@
 //! Exported files, read back by readers that this project did not write.
 #![cfg(feature = "files")]
 
-use tissue::export::{Cells, Collection, SurfaceFormat, write_frame, write_surface};
+use tissue::export::{Collection, SurfaceFormat, write_surface};
 use tissue::mesh::{Mesh, box_phantom};
-use vtkio::model::{Attribute, DataSet, VertexNumbers};
 
 fn body() -> (Mesh, Vec<[f32; 3]>) {
     let mesh = box_phantom([12.0, 8.0, 6.0], [3, 2, 2]).unwrap();
@@ -13,53 +12,6 @@ fn body() -> (Mesh, Vec<[f32; 3]>) {
         .map(|p| [0.1 * p[2], 0.0, -0.01 * p[0] * p[2]])
         .collect();
     (mesh, displacement)
-}
-
-#[test]
-fn a_frame_reads_back_as_vtk_sees_it() {
-    let (mesh, displacement) = body();
-    let contact: Vec<u8> = (0..mesh.node_count())
-        .map(|node| (node % 3 == 0) as u8)
-        .collect();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("frame.vtu");
-    for cells in [Cells::Tets(&mesh.tets), Cells::Triangles(&mesh.surface)] {
-        write_frame(&path, &mesh.positions, cells, &displacement, &contact).unwrap();
-        let DataSet::UnstructuredGrid { pieces, .. } = vtkio::Vtk::import(&path).unwrap().data
-        else {
-            panic!("not an unstructured grid");
-        };
-        let piece = pieces[0].load_piece_data(None).unwrap();
-        let points: Vec<f32> = piece.points.into_vec().unwrap();
-        assert_eq!(points, mesh.positions.as_flattened());
-        let nodes: Vec<u64> = match cells {
-            Cells::Tets(cells) => cells.as_flattened().iter().map(|&n| n.into()).collect(),
-            Cells::Triangles(cells) => cells.as_flattened().iter().map(|&n| n.into()).collect(),
-        };
-        let VertexNumbers::XML {
-            connectivity,
-            offsets,
-        } = piece.cells.cell_verts
-        else {
-            panic!("not XML cells");
-        };
-        assert_eq!(connectivity, nodes);
-        assert_eq!(offsets.last(), Some(&(nodes.len() as u64)));
-        let array = |name: &str| {
-            piece
-                .data
-                .point
-                .iter()
-                .find_map(|attribute| match attribute {
-                    Attribute::DataArray(array) if array.name == name => Some(array.data.clone()),
-                    _ => None,
-                })
-                .unwrap_or_else(|| panic!("no array {name}"))
-        };
-        let found: Vec<f32> = array("displacement").into_vec().unwrap();
-        assert_eq!(found, displacement.as_flattened());
-        assert_eq!(array("contact").into_vec::<u8>().unwrap(), contact);
-    }
 }
 
 #[test]
