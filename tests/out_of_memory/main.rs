@@ -15,7 +15,9 @@ mod fixture;
 mod host;
 mod scripts;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use allocator::without;
 use calls::{Call, Rig};
@@ -64,6 +66,15 @@ fn stride(call: &str) -> usize {
     }
 }
 
+/// Of what ships, whose steps are long, a fifth of them; each with `UPT_NIGHTLY=1`.
+fn every(bundle: &Path) -> usize {
+    let nightly = std::env::var_os("UPT_NIGHTLY").is_some_and(|value| value == "1");
+    let ships = bundle
+        .parent()
+        .is_some_and(|folder| folder.ends_with("onnx"));
+    if ships && !nightly { 5 } else { 1 }
+}
+
 /// Requests of all calls, refused one at a time. Returns how many were.
 fn starve(bundle: &Path, options: upt_scene_options, calls: &[Call]) -> usize {
     let mut rig = Rig::new(bundle, options);
@@ -76,14 +87,15 @@ fn starve(bundle: &Path, options: upt_scene_options, calls: &[Call]) -> usize {
     drop(rig);
     let mut all = 0;
     for (index, (name, call)) in calls.iter().enumerate() {
-        for at in (0..).step_by(stride(name)) {
+        let stride = stride(name) * every(bundle);
+        for at in (0..).step_by(stride) {
             let what = format!("{name}, request {at}");
             let mut rig = Rig::new(bundle, options);
             go_on(&what, &mut rig, &calls[..index], &given);
             rig.given.clear();
             let (status, refused) = without(least(name), at, || call(&mut rig));
             if !refused {
-                let count = at / stride(name);
+                let count = at / stride;
                 println!("{name}: {count} requests");
                 all += count;
                 break;
@@ -109,11 +121,10 @@ fn options(change: impl FnOnce(&mut upt_scene_options)) -> upt_scene_options {
     options
 }
 
-/// One test: the allocator is the process's.
-/// Verifies REQ-014.
-#[test]
-fn no_memory_is_a_status_wherever_it_is_missing() {
-    fixture::find_runtime();
+/// A bundle, a scene's options and the calls that are made with it.
+type Case = (PathBuf, upt_scene_options, &'static [Call]);
+
+fn cases(grouped: &Path) -> Vec<Case> {
     let corrected = options(|options| {
         options.corrections = 3;
         options.corrections_target_mm = 1e-4;
@@ -125,11 +136,10 @@ fn no_memory_is_a_status_wherever_it_is_missing() {
             .join("onnx")
             .join(name)
     };
-    let grouped = fixture::with_groups("tiny-corrected");
-    for (path, options, calls) in [
+    vec![
         (fixture::path("tiny-corrected"), corrected, CORRECTED),
         (fixture::path("tiny-corrected"), corrected, CUT),
-        (grouped.path().to_path_buf(), corrected, GROUPS),
+        (grouped.to_owned(), corrected, GROUPS),
         (fixture::path("tiny-corrected"), plain, DRIVEN),
         (fixture::path("tiny-upt-prior"), plain, DRIVEN),
         (fixture::path("tiny-upt-prior"), plain, PLAIN),
@@ -137,9 +147,58 @@ fn no_memory_is_a_status_wherever_it_is_missing() {
         // Tables of which each is as large as it gets.
         (brain("liver-coarse"), corrected, &CORRECTED[..5]),
         (brain("brain-coarse"), plain, &PLAIN[..2]),
-    ] {
-        let refused = starve(&path, options, calls);
+    ]
+}
+
+/// The case that a process of its own is for.
+const CASE: &str = "UPT_TEST_STARVED";
+
+/// One test: the allocator is the process's. Each case has a process, as many at a time as there are cores.
+/// Verifies REQ-014.
+#[test]
+fn no_memory_is_a_status_wherever_it_is_missing() {
+    fixture::find_runtime();
+    let grouped = fixture::with_groups("tiny-corrected");
+    let cases = cases(grouped.path());
+    let run = |(path, options, calls): &Case| {
+        let refused = starve(path, *options, calls);
         println!("{}: {refused} requests refused", path.display());
         assert!(refused > 20, "a scene has states");
+    };
+    if let Ok(case) = std::env::var(CASE) {
+        return run(&cases[case.parse::<usize>().unwrap()]);
     }
+    let program = std::env::current_exe().unwrap();
+    if Command::new(&program).arg("--list").output().is_err() {
+        println!("cases run one after another: an emulated program cannot start itself");
+        return cases.iter().for_each(run);
+    }
+    let (count, next) = (cases.len(), AtomicUsize::new(0));
+    let work = || {
+        loop {
+            let case = next.fetch_add(1, Ordering::Relaxed);
+            if case >= count {
+                break;
+            }
+            let child = Command::new(&program)
+                .args(["--exact", "--nocapture", NAME])
+                .env(CASE, case.to_string())
+                .output()
+                .unwrap();
+            let told = String::from_utf8_lossy(&child.stdout).into_owned()
+                + &String::from_utf8_lossy(&child.stderr);
+            println!("{told}");
+            assert!(child.status.success(), "case {case}: {told}");
+            assert!(told.contains("requests refused"), "case {case}: {told}");
+        }
+    };
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..workers.min(count) {
+            scope.spawn(work);
+        }
+    });
 }
+
+/// Of the test above.
+const NAME: &str = "no_memory_is_a_status_wherever_it_is_missing";
