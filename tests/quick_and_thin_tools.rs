@@ -108,6 +108,71 @@ fn quick_and_leaping_balls_do_not_pass_through() {
     assert!(deep.is_empty(), "deeper than 1 mm: {deep:?}");
 }
 
+/// A blade over a node of the domain, `height` above the highest tissue beneath it.
+fn blade(scene: &Scene, node: u32, height: f32) -> Tool {
+    let mesh = scene.mesh();
+    let positions = mesh.positions.as_chunks::<3>().0;
+    let at = |n: u32| Vector::from(positions[n as usize]);
+    let is_near = |n: &u32| at(*n).distance(at(node)) < 8.0;
+    let faces = mesh.domain_faces.as_chunks::<3>().0.iter();
+    let outward: Vector = faces
+        .filter(|face| face.iter().any(is_near))
+        .map(|face| face.map(at))
+        .map(|[a, b, c]| (b - a).cross(c - a))
+        .sum();
+    let outward = outward.normalize();
+    let turn = Rotation::from_rotation_arc(Vector::Z, outward);
+    let half = Vector::new(6.0, 8.0, 1.5);
+    let own = (0..positions.len() as u32).map(|n| turn.inverse() * (at(n) - at(node)));
+    let beneath = own.filter(|p| p.x.abs() < half.x && p.y.abs() < half.y && p.z.abs() < 20.0);
+    let top = beneath.map(|p| p.z).fold(0.0, f32::max);
+    let place = at(node) + outward * (top + half.z + height);
+    let shape = Shape::Spatula {
+        half_extents: half.to_array(),
+        radius: half.z,
+    };
+    Tool::new(&shape, place.to_array(), turn.to_array()).unwrap()
+}
+
+/// Verifies REQ-040.
+#[test]
+fn a_blade_that_leaps_while_it_presses_does_not_pass_through() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/brain-coarse-reduced");
+    let model = Model::open(&path, &ModelOptions::default()).unwrap();
+    let options = SceneOptions {
+        step_s: 0.02,
+        threads: 1,
+        ..SceneOptions::default()
+    };
+    let scene = Scene::new(Arc::clone(&model), &options).unwrap();
+    // The blade is 3 mm thick, goes to 3 mm and from there to 12 in one step.
+    for node in [1045, 2370, 393] {
+        let held = |leaps: bool| {
+            scene.reset().unwrap();
+            let mut force = 0.0;
+            for k in 0..110u16 {
+                let depth = match 0.2 * f32::from(k) {
+                    slow if slow > 3.0 && leaps => 12.0,
+                    slow => slow.min(12.0),
+                };
+                let (reading, flags) = step(&scene, blade(&scene, node, -depth));
+                force = Vector::from(reading.force).length();
+                let told = flags & (flag::DEEP | flag::UNSOLVED) != 0;
+                assert!(
+                    depth < 1.0 || force > 1.0 || told,
+                    "node {node}, step {k}: {reading:?}"
+                );
+            }
+            force
+        };
+        let (slow, quick) = (held(false), held(true));
+        assert!(
+            quick > 0.7 * slow && quick < 1.4 * slow,
+            "node {node}: {quick} for {slow} mN"
+        );
+    }
+}
+
 #[test]
 fn contact_on_the_linear_response_is_found_along_the_way_too() {
     let model = model();

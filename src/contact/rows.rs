@@ -1,6 +1,6 @@
 //! The rows of a contact problem: samples near tools, and their gaps and slips at a state of the tissue.
 
-use ::contact::{Body, Contact, Law, Pose, Samples, Vector, pose};
+use ::contact::{Body, Contact, Law, Nearest, Pose, Samples, Vector, pose};
 
 use super::buried::Buried;
 use super::past::Held;
@@ -20,6 +20,8 @@ const RECOVERY_MM: f32 = 3.0;
 const SHALLOW_MM: f32 = 0.5;
 /// ... nor one from which the way back through the tool is more than this many times its depth: that way grazes the tool's side.
 const LONG_WAY: f32 = 4.0;
+/// A force this near (cosine) to the normal of a broad tool's nearest face comes from there, friction and all.
+const SAME_FACE: f32 = 0.7;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
 const LEAN: f32 = 0.2;
 
@@ -96,7 +98,9 @@ impl Pair<'_> {
                 None if force == Vector::ZERO => return RELEASED,
                 None => {}
             }
-        } else if let Some((face, depth)) = self.pierced(point, start, outward, gap) {
+        } else if let Some((face, depth)) = (self.pierced(point, start, outward, gap))
+            .or_else(|| self.turned(point, outward, force, &nearest))
+        {
             (normal, gap) = (face, -depth);
         } else if normal.dot(outward) > LEAN {
             let pushed = force != Vector::ZERO;
@@ -136,8 +140,8 @@ impl Pair<'_> {
         }
     }
 
-    /// Where a thin tool has pierced the surface at a sample that lies inside of it: the normal where it entered, and how far ago. By the
-    /// shortest way the surface would come out at its side.
+    /// Where a thin tool, or a broad one in a quick step, has pierced the surface at a sample that lies inside of it: the normal where it
+    /// entered, and how far ago. By the shortest way the surface would come out at the tool's side.
     fn pierced(
         &self,
         point: Vector,
@@ -145,7 +149,8 @@ impl Pair<'_> {
         outward: Vector,
         gap: f32,
     ) -> Option<(Vector, f32)> {
-        if gap >= 0.0 || !self.body.pierces() {
+        let enters = self.body.pierces() || (self.swept && self.body.is_broad());
+        if gap >= 0.0 || !enters {
             return None;
         }
         let [now, then] = [(self.now, point), (self.from, start)]
@@ -153,6 +158,29 @@ impl Pair<'_> {
         let (entry, normal) = self.body.entry(then, now)?;
         let face = self.now.rotation * normal;
         let depth = (entry - now).dot(normal);
+        (face.dot(outward) < -LEAN && depth > 0.0).then_some((face, depth))
+    }
+
+    /// The face of a broad tool that pushes a sample inside of it, where another has become nearer, and how deep the sample lies behind it:
+    /// what a blade presses on does not slip round its edge, unless it leaves the blade there.
+    fn turned(
+        &self,
+        point: Vector,
+        outward: Vector,
+        force: Vector,
+        nearest: &Nearest,
+    ) -> Option<(Vector, f32)> {
+        if nearest.distance >= 0.0 || !self.body.is_broad() {
+            return None;
+        }
+        let pushed = force.try_normalize()?;
+        if nearest.normal.dot(pushed) > SAME_FACE {
+            return None;
+        }
+        let way = (self.body).way_out(self.now, point, pushed, 2.0 * self.body.size())?;
+        let out = point + pushed * way;
+        let face = self.body.nearest_at(self.now, out).normal;
+        let depth = (out - point).dot(face);
         (face.dot(outward) < -LEAN && depth > 0.0).then_some((face, depth))
     }
 
@@ -292,6 +320,27 @@ mod tests {
             let contact = plate(-0.6, -0.6, Vector::ZERO, Vector::Y, force, put);
             assert_eq!(contact.normal, -Vector::Y, "{contact:?}");
         }
+    }
+
+    #[test]
+    fn a_surface_in_front_of_a_quick_plate_is_pushed_on_and_not_past_its_edge() {
+        // The plate's front is 1.2 mm behind the sample, its edge 0.2 mm beside it.
+        let at = Vector::new(9.8, 0.0, 0.0);
+        let contact = plate(1.5, -0.2, at, Vector::Y, Vector::ZERO, false);
+        assert_eq!(contact.normal, -Vector::Y);
+        assert!((contact.gap + 1.2).abs() < 1e-2, "{contact:?}");
+    }
+
+    #[test]
+    fn what_a_plate_pushes_does_not_slip_round_its_edge() {
+        // It lies 0.5 mm behind the front and 0.2 mm from the edge.
+        let at = Vector::new(9.8, -0.5, 0.0);
+        let contact = plate(0.0, 0.0, at, Vector::Y, -Vector::Y, false);
+        assert_eq!(contact.normal, -Vector::Y);
+        assert!((contact.gap + 0.5).abs() < 1e-2, "{contact:?}");
+        // Nothing has pushed it yet: the edge is nearer.
+        let contact = plate(0.0, 0.0, at, Vector::Y, Vector::ZERO, true);
+        assert_eq!(contact.normal, Vector::X, "{contact:?}");
     }
 
     #[test]

@@ -40,6 +40,9 @@ const MORE_PRESSES: u32 = 6;
 const MORE_EVALUATIONS: u32 = 6;
 const EVALUATIONS: u32 = 2;
 
+/// Parts of their way at which broad tools stop that thrust farther than the step can follow.
+const STOPS: [f32; 4] = [0.5, 0.25, 0.1, 0.0];
+
 /// How often a step is made again because ties break; what is pulled too hard then breaks in the next.
 const MOST_BREAKS: u32 = 6;
 /// Parts of the tools' way after which a guess that inverts elements is improved by an iteration, at most.
@@ -93,6 +96,15 @@ impl ImplicitSolver {
             Ok(report)
         };
         let mut report = made(problem, true)?;
+        // Tools that no single step follows stop on their way, at last where they were.
+        for part in STOPS {
+            if !(problem.is_thrust() && (report.fell_back || problem.has_passed())) {
+                break;
+            }
+            problem.stop_at(part);
+            problem.work.renew();
+            report = made(problem, true)?;
+        }
         if problem.tears() {
             report = made(problem, true)?;
         }
@@ -102,6 +114,7 @@ impl ImplicitSolver {
             left -= 1;
             report = made(problem, left > 0)?;
         }
+        problem.tell_lag();
         Ok(report)
     }
 

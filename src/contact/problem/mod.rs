@@ -9,6 +9,7 @@ mod forces;
 mod loads;
 mod look;
 mod solve;
+mod thrust;
 mod tie_set;
 mod tied;
 mod work;
@@ -58,6 +59,8 @@ pub struct ContactProblem {
     tools: Vec<Tool>,
     /// Where each tool was when the step began.
     before: Vec<Pose>,
+    /// Where the host has put each: a broad one that thrusts may stop on its way there.
+    goals: Vec<Pose>,
     /// Which of them were put there in this step.
     put: Vec<bool>,
     /// One of those was elsewhere before.
@@ -126,6 +129,7 @@ impl ContactProblem {
         Ok(ContactProblem {
             tools: memory::room(MAX_TOOLS, WHAT)?,
             before: memory::room(MAX_TOOLS, WHAT)?,
+            goals: memory::room(MAX_TOOLS, WHAT)?,
             put: memory::room(MAX_TOOLS, WHAT)?,
             has_leapt: false,
             swept: memory::room(MAX_TOOLS, WHAT)?,
@@ -174,6 +178,7 @@ impl ContactProblem {
     pub fn forget_tools(&mut self) {
         self.tools.clear();
         self.before.clear();
+        self.goals.clear();
         self.put.clear();
         self.swept.clear();
         self.may_lose.clear();
@@ -253,6 +258,8 @@ impl ContactProblem {
             start,
         };
         self.before.clear();
+        self.goals.clear();
+        self.goals.extend(tools.iter().map(|tool| tool.pose));
         self.put.clear();
         self.has_leapt = false;
         self.swept.clear();

@@ -30,7 +30,9 @@ impl ImplicitSolver {
         if left > SUNK_MM {
             self.respond_from_rest(context, input, problem, at, report)?;
             let from_rest = self.press_on(context, input, problem, SUNK_MM, at.u)?;
-            if from_rest < left {
+            // No force at all: the tool lies where samples cannot see it, and the tissue is where no tool pushed it.
+            let is_lost = problem.had_forces() && !problem.has_forces();
+            if from_rest < left && !is_lost {
                 left = from_rest;
                 self.keep(problem, at)?;
             }

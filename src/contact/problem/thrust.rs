@@ -1,0 +1,56 @@
+//! Broad tools that go on into tissue which they push, faster than a step can follow: a blade of 3 mm that leaps 9 mm would be behind the samples
+//! that it pushed, where nothing finds them. It is followed as far as it can be, and the rest of its way is the next step's.
+
+use ::contact::{Vector, pose};
+
+use super::ContactProblem;
+use crate::contact::past::Force;
+
+impl ContactProblem {
+    /// Whether a broad tool goes quickly on into tissue that it pushed when the step began.
+    pub fn is_thrust(&self) -> bool {
+        (0..self.tools.len()).any(|index| self.thrusts(index))
+    }
+
+    /// Whether such a tool touches nothing any more.
+    pub fn has_passed(&self) -> bool {
+        let pushes = |index: usize| {
+            let mut forces = self.next.forces.iter();
+            forces.any(|force| force.tool == index as u32)
+        };
+        (0..self.tools.len()).any(|index| self.thrusts(index) && !pushes(index))
+    }
+
+    fn thrusts(&self, index: usize) -> bool {
+        if !self.swept[index] || !self.tools[index].body.is_broad() {
+            return false;
+        }
+        let own = |force: &&Force| force.tool == index as u32;
+        let pushed: Vector = (self.past.forces.iter().filter(own))
+            .map(|force| force.force)
+            .sum();
+        let way = self.goals[index].translation - self.before[index].translation;
+        way.dot(pushed) > 0.0
+    }
+
+    /// Such tools stop at part `part` of their way.
+    pub fn stop_at(&mut self, part: f32) {
+        for index in 0..self.tools.len() {
+            if self.thrusts(index) {
+                let at = pose::between(&self.before[index], &self.goals[index], part);
+                self.tools[index].pose = at;
+                self.next.tools[index].pose = at;
+            }
+        }
+    }
+
+    /// A tool that has stopped on its way lies so much deeper in the tissue where the host has it.
+    pub fn tell_lag(&mut self) {
+        let tools = self.tools.iter().zip(&self.goals);
+        for (held, (tool, goal)) in self.next.tools.iter_mut().zip(tools) {
+            if held.pose != *goal {
+                held.reading.penetration_mm += tool.body.motion(&held.pose, goal);
+            }
+        }
+    }
+}
