@@ -769,7 +769,7 @@ typedef struct upt_instrument {
   /**
    * `UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.
    */
-  const void *hull;
+  const struct upt_hull *hull;
 } upt_instrument;
 
 /**

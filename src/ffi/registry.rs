@@ -12,7 +12,7 @@ use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 use super::call::call;
 use super::constants::*;
 use super::failure::{Answer, Failure, fail};
-use super::structs::upt_hull;
+use super::step_structs::upt_hull;
 use super::structs::{upt_model, upt_scene};
 use crate::model::Model;
 use crate::scene::Scene;
@@ -132,7 +132,7 @@ pub(super) fn add_hull(body: ::contact::Body) -> *mut upt_hull {
     without_provenance_mut(HULLS.insert(Arc::new(body)))
 }
 
-pub(super) fn find_hull(hull: *const std::ffi::c_void) -> Result<Arc<::contact::Body>, Failure> {
+pub(super) fn find_hull(hull: *const upt_hull) -> Result<Arc<::contact::Body>, Failure> {
     HULLS.get(hull.addr())
 }
 

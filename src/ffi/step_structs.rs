@@ -1,6 +1,5 @@
 //! The structs of a step: what drives it, what is shown of it, and what instruments are told. Conventions: `structs.rs`.
 
-use core::ffi::c_void;
 use core::ptr::null;
 use safer_ffi::derive_ReprC;
 
@@ -259,6 +258,13 @@ impl upt_view {
     };
 }
 
+/// The convex hull of a tool's points. Immutable; any number of threads may use it at once.
+#[derive_ReprC]
+#[repr(opaque)]
+pub struct upt_hull {
+    _opaque: [u8; 0],
+}
+
 /// A rigid instrument, as `upt_input` and `upt_scene_contacts_from_instruments` take it.
 #[derive_ReprC]
 #[repr(C)]
@@ -287,7 +293,7 @@ pub struct upt_instrument {
     /// A grasp tears off when its points together pull harder than this, mN; 0: never.
     pub tear_off_mn: f32,
     /// `UPT_SHAPE_HULL`: the `upt_hull`; otherwise NULL.
-    pub hull: *const c_void,
+    pub hull: *const upt_hull,
 }
 
 /// What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.

@@ -17,11 +17,6 @@ pub struct upt_scene {
     _opaque: [u8; 0],
 }
 
-/// The convex hull of a tool's points. Immutable; any number of threads may use it at once.
-pub struct upt_hull {
-    _opaque: [u8; 0],
-}
-
 /// A tool that a hand feels. One thread at a time may use it; a second one gets `UPT_ERR_BUSY`.
 pub struct upt_haptics {
     _opaque: [u8; 0],

@@ -27,7 +27,7 @@ impl World<'_> {
             one.friction = random.next(3) as f32 * 0.3;
             one.tear_off_mn = random.next(2) as f32 * 20.0;
             if one.shape == UPT_SHAPE_HULL {
-                one.hull = hull.unwrap_or(null_mut()).cast_const().cast();
+                one.hull = hull.unwrap_or(null_mut()).cast_const();
             }
             spoil(&mut one.position, call.odd, call.seed as usize % 3);
             one

@@ -96,7 +96,7 @@ static void walk_refusals(upt_scene *scene, upt_instrument good, const upt_hull 
       break;
     default:
       two[1].shape = UPT_SHAPE_HULL;
-      two[1].hull = scene; /* another kind of handle */
+      two[1].hull = (const upt_hull *)(const void *)scene; /* another kind of handle */
       wanted = UPT_ERR_HANDLE;
     }
     EXPECT(step_tools(scene, two, 2, NULL, 0), wanted);

@@ -61,7 +61,7 @@ fn what_a_step_takes_gives_contacts_too() {
         unsafe { upt_hull_create(corners.as_ptr(), 8, &mut hull) },
         UPT_OK
     );
-    (ball.shape, ball.radius, ball.hull) = (UPT_SHAPE_HULL, 0.0, hull.cast_const().cast());
+    (ball.shape, ball.radius, ball.hull) = (UPT_SHAPE_HULL, 0.0, hull.cast_const());
     let (status, count) = contacts(&host, &ball);
     assert_eq!(status, UPT_OK, "{}", message());
     assert!(count > 0);

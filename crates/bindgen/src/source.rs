@@ -123,7 +123,7 @@ impl Source {
                     value,
                 });
             }
-            Item::Struct(item) if is_public(&item.vis) && has(&item.attrs, "repr") => {
+            Item::Struct(item) if is_public(&item.vis) && is_c(&item.attrs) => {
                 let fields = item.fields.iter().map(|field| {
                     Ok(Named {
                         doc: doc(&field.attrs),
@@ -173,10 +173,14 @@ fn is_public(visibility: &syn::Visibility) -> bool {
     matches!(visibility, syn::Visibility::Public(_))
 }
 
-fn has(attributes: &[Attribute], name: &str) -> bool {
-    attributes
-        .iter()
-        .any(|attribute| attribute.path().is_ident(name))
+/// `repr(C)`; a handle may be `repr(opaque)`.
+fn is_c(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        attribute.path().is_ident("repr")
+            && attribute
+                .parse_args::<syn::Path>()
+                .is_ok_and(|path| path.is_ident("C"))
+    })
 }
 
 fn integer(literal: &Lit) -> Result<String> {

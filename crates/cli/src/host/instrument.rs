@@ -30,8 +30,8 @@ impl Hull {
     }
 
     /// What `upt_instrument` holds.
-    pub fn handle(&self) -> *const std::ffi::c_void {
-        self.handle.cast_const().cast()
+    pub fn handle(&self) -> *const ffi::upt_hull {
+        self.handle.cast_const()
     }
 }
 
