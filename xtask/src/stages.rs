@@ -115,7 +115,7 @@ fn rustdoc(workspace: &Workspace) -> Result<Outcome> {
 
 /// Apart from [`rust`]: the layouts that it compares are written by a feature of libupt that no release has.
 fn abi(workspace: &Workspace) -> Result<Outcome> {
-    let mut command = workspace.cargo("test --release --no-fail-fast -p upt-bindgen");
+    let mut command = workspace.cargo("test --profile layout --no-fail-fast -p upt-bindgen");
     counted(workspace, "cargo test", &mut command, counts::cargo)
 }
 
