@@ -7,6 +7,7 @@ mod inputs;
 mod met;
 mod run;
 mod sudden;
+mod thrust;
 mod truth;
 
 use std::path::Path;
@@ -45,7 +46,9 @@ pub fn rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
 
 /// Tools that a step could lose, and those whose step takes longest.
 pub fn sudden_rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
-    let mut rows = sudden::rows(&mut Hands::for_frames(bench, path)?)?;
+    let mut hands = Hands::for_frames(bench, path)?;
+    let mut rows = sudden::rows(&mut hands)?;
+    rows.extend(thrust::rows(&mut hands)?);
     rows.extend(deep::rows(bench, path)?);
     Ok(rows)
 }
