@@ -293,7 +293,19 @@ mod tests {
 
     /// A plate, 20 by 2 by 20 mm, that went from height `from` to height `to`, and a sample that did not move: its contact.
     fn plate(from: f32, to: f32, at: Vector, outward: Vector, force: Vector, put: bool) -> Contact {
-        let half_extents = [10.0, 1.0, 10.0];
+        slab(1.0, [from, to], at, outward, force, put)
+    }
+
+    /// The same of half the thickness `half`.
+    fn slab(
+        half: f32,
+        [from, to]: [f32; 2],
+        at: Vector,
+        outward: Vector,
+        force: Vector,
+        put: bool,
+    ) -> Contact {
+        let half_extents = [10.0, half, 10.0];
         let body = Body::new(&Shape::Box { half_extents }).unwrap();
         let pose = |height| Pose::from_translation(Vector::new(0.0, height, 0.0));
         let pair = Pair {
@@ -323,23 +335,23 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_in_front_of_a_quick_plate_is_pushed_on_and_not_past_its_edge() {
-        // The plate's front is 1.2 mm behind the sample, its edge 0.2 mm beside it.
+    fn a_surface_in_front_of_a_quick_slab_is_pushed_on_and_not_past_its_edge() {
+        // The slab's front is 1.2 mm behind the sample, its edge 0.2 mm beside it.
         let at = Vector::new(9.8, 0.0, 0.0);
-        let contact = plate(1.5, -0.2, at, Vector::Y, Vector::ZERO, false);
+        let contact = slab(2.0, [2.5, 0.8], at, Vector::Y, Vector::ZERO, false);
         assert_eq!(contact.normal, -Vector::Y);
         assert!((contact.gap + 1.2).abs() < 1e-2, "{contact:?}");
     }
 
     #[test]
-    fn what_a_plate_pushes_does_not_slip_round_its_edge() {
+    fn what_a_slab_pushes_does_not_slip_round_its_edge() {
         // It lies 0.5 mm behind the front and 0.2 mm from the edge.
-        let at = Vector::new(9.8, -0.5, 0.0);
-        let contact = plate(0.0, 0.0, at, Vector::Y, -Vector::Y, false);
+        let at = Vector::new(9.8, -1.5, 0.0);
+        let contact = slab(2.0, [0.0; 2], at, Vector::Y, -Vector::Y, false);
         assert_eq!(contact.normal, -Vector::Y);
         assert!((contact.gap + 0.5).abs() < 1e-2, "{contact:?}");
         // Nothing has pushed it yet: the edge is nearer.
-        let contact = plate(0.0, 0.0, at, Vector::Y, Vector::ZERO, true);
+        let contact = slab(2.0, [0.0; 2], at, Vector::Y, Vector::ZERO, false);
         assert_eq!(contact.normal, Vector::X, "{contact:?}");
     }
 
