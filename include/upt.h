@@ -1714,6 +1714,26 @@ upt_status upt_model_support(const struct upt_model *model,
                              uint64_t *needed);
 
 /**
+ * Names a region of the surface that the bundle names, and copies its nodes: what `upt_pressure.nodes` takes.
+ *
+ * - `region`: from 0; the regions end where this is `UPT_ERR_ARGUMENT` (`upt_model_describe` lists them).
+ * - `name`: receives text with its NUL; NULL with capacity 0 leaves it out.
+ * - `nodes`: node indices, ascending; NULL with capacity 0 only queries the size.
+ * - `node_capacity`: number of indices that fit in `nodes`.
+ * - `needed`: number of nodes of the region, always written; may be NULL.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such region, a capacity too small).
+ */
+upt_status upt_model_region(const struct upt_model *model,
+                            uint32_t region,
+                            char *name,
+                            uint64_t name_capacity,
+                            uint32_t *nodes,
+                            uint64_t node_capacity,
+                            uint64_t *needed);
+
+/**
  * Creates a scene at rest.
  *
  * - `options`: NULL means the defaults.

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 import weakref
+from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -100,10 +101,18 @@ class Model:
     @cached_property
     def supports(self) -> dict[str, Indices]:
         """The bundle's support groups, in order: by name their nodes, `[n]` uint32; `Loads.supports` moves them."""
+        return self._named("supports", lib.upt_model_support)
+
+    @cached_property
+    def regions(self) -> dict[str, Indices]:
+        """The named regions of the surface: by name their nodes, `[n]` uint32; `Loads.pressures` takes them."""
+        return self._named("regions", lib.upt_model_region)
+
+    def _named(self, what: str, read: Callable[..., int]) -> dict[str, Indices]:
         found: dict[str, Indices] = {}
-        for group, entry in enumerate(self.describe()["supports"]):
+        for at, entry in enumerate(self.describe()[what]):
             out = np.empty(entry["nodes"], np.uint32)
-            check(lib.upt_model_support(self._handle, group, None, 0, address(out), out.size, None))
+            check(read(self._handle, at, None, 0, address(out), out.size, None))
             found[entry["name"]] = out
         return found
 

@@ -74,6 +74,7 @@ impl Mesh {
             surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
             held_nodes: unique(held_nodes),
             supports: Vec::new(),
+            regions: Vec::new(),
             node_area,
             sha256: self.sha256.clone(),
             domain_sides: OnceLock::new(),

@@ -43,6 +43,7 @@ const KEYS: &[(&str, &[&str])] = &[
             "precisions",
             "prior",
             "supports",
+            "regions",
             "corrections",
             "upt",
             "reduced",

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use crate::memory::HeldBytes;
+use super::node_set::NodeSet;
 
 /// The kinds a manifest may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -24,16 +24,6 @@ pub enum Boundary {
     Fixed,
     /// The mesh's `fixed` and `supported`.
     Supported,
-}
-
-/// Held nodes that move as one, apart from the others.
-#[derive(Debug, Clone, Deserialize, HeldBytes)]
-pub struct SupportSet {
-    /// Its name.
-    #[held(skip)]
-    pub name: String,
-    /// Held nodes, ascending; none of another group's.
-    pub nodes: Vec<u32>,
 }
 
 /// Which mesh the bundle is for.
@@ -342,7 +332,10 @@ pub struct Manifest {
     pub prior: Option<PriorEntry>,
     /// Support groups.
     #[serde(default)]
-    pub supports: Vec<SupportSet>,
+    pub supports: Vec<NodeSet>,
+    /// Named parts of the surface, which may overlap.
+    #[serde(default)]
+    pub regions: Vec<NodeSet>,
     /// Corrections by the elements.
     pub corrections: Option<CorrectionsEntry>,
     /// Kind `upt`.

@@ -5,7 +5,8 @@ use std::sync::OnceLock;
 use sha2::{Digest, Sha256};
 
 use super::files::hex;
-use super::manifest::{Boundary, SupportSet};
+use super::manifest::Boundary;
+use super::node_set::NodeSet;
 use super::tensors::TensorFile;
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
@@ -35,7 +36,9 @@ pub struct Mesh {
     /// Nodes held at zero, ascending.
     pub held_nodes: Vec<u32>,
     /// Parts of them that move apart from the others.
-    pub supports: Vec<SupportSet>,
+    pub supports: Vec<NodeSet>,
+    /// Named parts of the surface.
+    pub regions: Vec<NodeSet>,
     /// A third of the area of each node's boundary triangles `[K]`, mm^2.
     pub node_area: Vec<f32>,
     /// The mesh hash of `docs/reference/formats.md`.
@@ -133,14 +136,24 @@ impl Mesh {
             sha256: hex(&hash.finalize()),
             domain_sides: OnceLock::new(),
             supports: Vec::new(),
+            regions: Vec::new(),
         })
+    }
+
+    /// Takes the support groups and the regions of the bundle that it is of.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] with the group or region.
+    pub fn take_named(&mut self, supports: &[NodeSet], regions: &[NodeSet]) -> Result<()> {
+        self.take_supports(supports)?;
+        self.take_regions(regions)
     }
 
     /// Takes the support groups of the bundle that it is of.
     ///
     /// # Errors
     /// [`Error::Bundle`] with the group.
-    pub fn take_supports(&mut self, groups: &[SupportSet]) -> Result<()> {
+    fn take_supports(&mut self, groups: &[NodeSet]) -> Result<()> {
         let bad = |index: usize, problem: String| {
             Err(Error::bundle(
                 "bundle.json",
@@ -174,6 +187,48 @@ impl Mesh {
             }
         }
         self.supports = memory::collected(groups.len(), groups.iter().cloned(), WHAT)?;
+        Ok(())
+    }
+
+    /// Takes the named regions of the bundle that it is of.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] with the region.
+    fn take_regions(&mut self, regions: &[NodeSet]) -> Result<()> {
+        let bad = |index: usize, problem: String| {
+            Err(Error::bundle(
+                "bundle.json",
+                format!("field `regions[{index}]` {problem}"),
+            ))
+        };
+        if regions.len() > MOST_SUPPORTS {
+            return bad(MOST_SUPPORTS, format!("is one more than {MOST_SUPPORTS}"));
+        }
+        for (index, region) in regions.iter().enumerate() {
+            let mut others = regions[..index].iter();
+            if region.name.is_empty() || others.any(|other| other.name == region.name) {
+                return bad(
+                    index,
+                    format!("has the name `{}`, must have one of its own", region.name),
+                );
+            }
+            let is_in = |node: &u32| region.nodes.binary_search(node).is_ok();
+            let faces = self.surface_faces.as_chunks::<3>().0;
+            if !region.nodes.is_sorted_by(|a, b| a < b)
+                || !faces.iter().any(|face| face.iter().all(is_in))
+            {
+                return bad(
+                    index,
+                    "must have the nodes of at least one boundary triangle, ascending".into(),
+                );
+            }
+            if let Some(node) =
+                (region.nodes.iter()).find(|node| **node as usize >= self.node_count())
+            {
+                return bad(index, format!("has node {node}, which the mesh lacks"));
+            }
+        }
+        self.regions = memory::collected(regions.len(), regions.iter().cloned(), WHAT)?;
         Ok(())
     }
 

@@ -10,6 +10,7 @@ mod known;
 mod maker;
 mod manifest;
 mod mesh;
+mod node_set;
 mod parse;
 mod place;
 mod seal;
@@ -20,10 +21,11 @@ pub(crate) use files::hex;
 pub use manifest::{
     Base, Bound, Boundary, Coordinates, CorrectionsEntry, Dims, Envelope, Fade, Feature, FileEntry,
     Graph, Manifest, ManifestKind, MeshEntry, Normalisation, PriorEntry, ReducedEntry,
-    ReducedInput, SupportSet, ToolEnvelope, UptEntry,
+    ReducedInput, ToolEnvelope, UptEntry,
 };
 pub use mesh::Mesh;
 pub(crate) use mesh::volume;
+pub use node_set::NodeSet;
 pub(crate) use place::read_regular;
 pub use place::{Place, file_of};
 pub use tensors::TensorFile;

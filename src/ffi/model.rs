@@ -213,21 +213,71 @@ pub unsafe extern "C" fn upt_model_support(
         || (),
         || {
             let model = find_model(model)?;
-            let count = model.supports().count();
-            let Some((text, own)) = model.supports().nth(group as usize) else {
-                return super::failure::fail(
-                    UPT_ERR_ARGUMENT,
-                    format!("group is {group}, the bundle has {count}"),
-                );
-            };
-            if !name.is_null() || name_capacity != 0 {
-                // SAFETY: `name` has room for `name_capacity` elements, as the header asks.
-                let status =
-                    unsafe { output::copy_text(text, name, name_capacity, std::ptr::null_mut()) }?;
-                debug_assert_eq!(status, UPT_OK);
-            }
-            // SAFETY: `nodes` has room for that many elements and `needed` is NULL or writable, as the header asks.
-            unsafe { output::copy_out(own, nodes, node_capacity, needed) }
+            let sets = ("group", model.supports());
+            let (name, nodes) = ((name, name_capacity), (nodes, node_capacity));
+            // SAFETY: the host passes room as the header asks.
+            unsafe { copy_named(sets, group, name, nodes, needed) }
         },
     )
+}
+
+/// Names a region of the surface that the bundle names, and copies its nodes: what `upt_pressure.nodes` takes.
+///
+/// - `region`: from 0; the regions end where this is `UPT_ERR_ARGUMENT` (`upt_model_describe` lists them).
+/// - `name`: receives text with its NUL; NULL with capacity 0 leaves it out.
+/// - `nodes`: node indices, ascending; NULL with capacity 0 only queries the size.
+/// - `node_capacity`: number of indices that fit in `nodes`.
+/// - `needed`: number of nodes of the region, always written; may be NULL.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such region, a capacity too small).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_model_region(
+    model: *const upt_model,
+    region: u32,
+    name: *mut c_char,
+    name_capacity: u64,
+    nodes: *mut u32,
+    node_capacity: u64,
+    needed: *mut u64,
+) -> upt_status {
+    call(
+        "upt_model_region",
+        || (),
+        || {
+            let model = find_model(model)?;
+            let sets = ("region", model.regions());
+            let (name, nodes) = ((name, name_capacity), (nodes, node_capacity));
+            // SAFETY: the host passes room as the header asks.
+            unsafe { copy_named(sets, region, name, nodes, needed) }
+        },
+    )
+}
+
+/// Name and nodes of the set at a place among those that a bundle names.
+///
+/// # Safety
+/// `name` and `nodes` have room for as many elements as stands beside them, and `needed` is NULL or writable.
+unsafe fn copy_named<'a>(
+    (what, mut sets): (&str, impl Iterator<Item = (&'a str, &'a [u32])>),
+    at: u32,
+    (name, name_capacity): (*mut c_char, u64),
+    (nodes, node_capacity): (*mut u32, u64),
+    needed: *mut u64,
+) -> super::failure::Answer {
+    let mut count = 0u32;
+    let found = sets.by_ref().inspect(|_| count += 1).nth(at as usize);
+    let Some((text, own)) = found else {
+        return super::failure::fail(
+            UPT_ERR_ARGUMENT,
+            format!("{what} is {at}, the bundle has {count}"),
+        );
+    };
+    if !name.is_null() || name_capacity != 0 {
+        // SAFETY: the caller's.
+        let status = unsafe { output::copy_text(text, name, name_capacity, std::ptr::null_mut()) }?;
+        debug_assert_eq!(status, UPT_OK);
+    }
+    // SAFETY: the caller's.
+    unsafe { output::copy_out(own, nodes, node_capacity, needed) }
 }

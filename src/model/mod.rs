@@ -21,7 +21,7 @@ pub use reduced::{LearnedMap, ReducedModel};
 pub use upt::{UptModel, UptTables};
 pub use upt_stages::DECODER_TILE;
 
-use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, Place};
+use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, NodeSet, Place};
 use crate::corrections::Corrections;
 use crate::error::Result;
 use crate::kernels::{FlushToZero, Isa};
@@ -143,7 +143,7 @@ impl Model {
         let _mode = FlushToZero::of_portable(isa);
         let mesh_file = files.tensors(&manifest.mesh.file)?;
         let mut mesh = Mesh::parse(&mesh_file, manifest.boundary)?;
-        mesh.take_supports(&manifest.supports)?;
+        mesh.take_named(&manifest.supports, &manifest.regions)?;
         if mesh.node_count() != manifest.mesh.nodes {
             return Err(crate::error::Error::bundle(
                 "bundle.json",
@@ -328,9 +328,8 @@ impl Model {
             "bundle_sha256": crate::bundle::hex(&self.hash),
             "mesh_sha256": self.mesh.sha256,
             "nodes": self.mesh.node_count(),
-            "supports": self.mesh.supports.iter().map(|group| {
-                serde_json::json!({"name": group.name, "nodes": group.nodes.len()})
-            }).collect::<Vec<_>>(),
+            "supports": NodeSet::listed(&self.mesh.supports),
+            "regions": NodeSet::listed(&self.mesh.regions),
             "threads": self.threads,
             "stages": stages,
             "providers_refused": refused,

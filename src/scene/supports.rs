@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::support::{Affine, SupportPose, affine};
-use crate::bundle::{Mesh, SupportSet};
+use crate::bundle::{Mesh, NodeSet};
 use crate::corrections::Held;
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
@@ -46,7 +46,7 @@ pub(super) struct GroupState {
 ///
 /// # Errors
 /// [`Error::Argument`] and [`Error::NonFinite`], with the field.
-pub(super) fn check(motions: &[GroupMotion<'_>], groups: &[SupportSet]) -> Result<()> {
+pub(super) fn check(motions: &[GroupMotion<'_>], groups: &[NodeSet]) -> Result<()> {
     let mut seen = 0u64;
     for (index, motion) in motions.iter().enumerate() {
         let bad = |reason: String| Err(Error::Argument(format!("supports[{index}]: {reason}")));
@@ -147,7 +147,7 @@ impl GroupState {
     pub(super) fn take(
         &mut self,
         mesh: &Mesh,
-        group: &SupportSet,
+        group: &NodeSet,
         motion: &GroupMotion<'_>,
         (before, u): (Option<&GroupState>, &[f32]),
         places: &mut Vec<(u32, [f32; 3])>,
@@ -270,7 +270,7 @@ pub(super) fn acts(states: &[GroupState]) -> bool {
 ///
 /// # Errors
 /// [`Error::Snapshot`].
-pub(super) fn admit(states: &[GroupState], groups: &[SupportSet]) -> Result<()> {
+pub(super) fn admit(states: &[GroupState], groups: &[NodeSet]) -> Result<()> {
     if !states.is_empty() && states.len() != groups.len() {
         return Err(Error::Snapshot("the support groups are others".into()));
     }

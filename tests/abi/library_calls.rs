@@ -9,6 +9,10 @@ use super::inputs::*;
 use super::{Call, Function, Odd, Size, World};
 use crate::fixture;
 
+/// `upt_model_support` and `upt_model_region`.
+type Named =
+    unsafe extern "C" fn(*const upt_model, u32, *mut c_char, u64, *mut u32, u64, *mut u64) -> i32;
+
 unsafe extern "C" fn ignore(_: i32, _: *const c_char, _: *mut std::ffi::c_void) {}
 
 impl World<'_> {
@@ -103,7 +107,7 @@ impl World<'_> {
                     );
                     ("upt_model_indices", status)
                 }
-                Function::ModelSupport => {
+                Function::ModelSupport | Function::ModelRegion => {
                     let mut name = [0 as std::ffi::c_char; 32];
                     let (mut nodes, mut needed) = ([0u32; 64], 0u64);
                     let group = if wrong {
@@ -112,7 +116,11 @@ impl World<'_> {
                         call.seed as u32 % 3
                     };
                     let (capacity, _) = count(nodes.len() - 1, call.size);
-                    let status = upt_model_support(
+                    let (named, ask): (_, Named) = match call.function {
+                        Function::ModelRegion => ("upt_model_region", upt_model_region),
+                        _ => ("upt_model_support", upt_model_support),
+                    };
+                    let status = ask(
                         model,
                         group,
                         pointer_mut(&mut name, call, 0),
@@ -121,7 +129,7 @@ impl World<'_> {
                         capacity.min(nodes.len() as u64),
                         pointer_mut(std::slice::from_mut(&mut needed), call, 2),
                     );
-                    ("upt_model_support", status)
+                    (named, status)
                 }
                 Function::SceneCreate => (
                     "upt_scene_create",

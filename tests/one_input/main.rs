@@ -16,6 +16,7 @@ mod host;
 mod loads;
 mod mistakes;
 mod mobilise;
+mod regions;
 mod supports;
 mod ties;
 

@@ -101,16 +101,30 @@ namespace Upt.Interop
         /// from 0; their names are in <see cref="Describe"/>, under <c>supports</c>.</summary>
         public uint[] SupportNodes(int group)
         {
+            return Named(checked((uint)group), false);
+        }
+
+        /// <summary>Node indices of a region of the surface, ascending: what <see cref="Pressure.Nodes"/> takes. Regions count
+        /// from 0; their names are in <see cref="Describe"/>, under <c>regions</c>.</summary>
+        public uint[] RegionNodes(int region)
+        {
+            return Named(checked((uint)region), true);
+        }
+
+        uint[] Named(uint at, bool region)
+        {
             bool added = false;
             handle.DangerousAddRef(ref added);
             try
             {
                 IntPtr model = handle.DangerousGetHandle();
                 ulong needed = 0;
-                Status.Check(Native.upt_model_support(model, checked((uint)group), null, 0, null, 0, &needed));
+                Status.Check(region ? Native.upt_model_region(model, at, null, 0, null, 0, &needed)
+                                    : Native.upt_model_support(model, at, null, 0, null, 0, &needed));
                 uint[] nodes = new uint[needed];
-                fixed (uint* pointer = nodes)
-                    Status.Check(Native.upt_model_support(model, (uint)group, null, 0, pointer, needed, &needed));
+                fixed (uint* to = nodes)
+                    Status.Check(region ? Native.upt_model_region(model, at, null, 0, to, needed, &needed)
+                                        : Native.upt_model_support(model, at, null, 0, to, needed, &needed));
                 return nodes;
             }
             finally

@@ -988,6 +988,21 @@ namespace Upt.Interop
         public static extern int upt_model_support(IntPtr model, uint group, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
 
         /// <summary>
+        /// Names a region of the surface that the bundle names, and copies its nodes: what `upt_pressure.nodes` takes.
+        ///
+        /// - `region`: from 0; the regions end where this is `UPT_ERR_ARGUMENT` (`upt_model_describe` lists them).
+        /// - `name`: receives text with its NUL; NULL with capacity 0 leaves it out.
+        /// - `nodes`: node indices, ascending; NULL with capacity 0 only queries the size.
+        /// - `node_capacity`: number of indices that fit in `nodes`.
+        /// - `needed`: number of nodes of the region, always written; may be NULL.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such region, a capacity too small).
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_model_region(IntPtr model, uint region, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
+
+        /// <summary>
         /// Creates a scene at rest.
         ///
         /// - `options`: NULL means the defaults.

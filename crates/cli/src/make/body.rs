@@ -77,6 +77,10 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
         ));
     }
     choose_domain(&mut mesh, options, &open(&options.domain)?, stage)?;
+    let inside: Vec<Vec<u32>> = (options.pressure.iter())
+        .map(|own| Ok(nodes_in(&mesh, &[own.region.open(&input, scale)?])))
+        .collect::<Result<_, ImportError>>()?;
+    let regions = fixed::regions(&options.pressure, &inside, &mesh.surface)?;
     if let Some(name) = &options.name {
         mesh.name.clone_from(name);
     }
@@ -84,13 +88,13 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
     let path = stage.folder.join("mesh.safetensors");
     mesh.write(&path)
         .with_context(|| format!("{}: cannot be written", path.display()))?;
-    fixed::write(&groups, &stage.folder)?;
-    for group in &groups {
-        stage.decided(&format!(
-            "support group `{}`: {} nodes",
-            group.name,
-            group.nodes.len()
-        ));
+    fixed::write(&groups, &stage.folder, fixed::SUPPORTS)?;
+    fixed::write(&regions, &stage.folder, fixed::REGIONS)?;
+    for (what, sets) in [("support group", &groups), ("region", &regions)] {
+        for set in sets {
+            let (name, count) = (&set.name, set.nodes.len());
+            stage.decided(&format!("{what} `{name}`: {count} nodes"));
+        }
     }
     let quality = measure(&mesh);
     stage.decided(&format!(

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tissue::mesh::Mesh;
 
+use super::fixed;
 use super::options::{Options, Sizes};
 
 /// What a bundle of this command says of its origin.
@@ -118,7 +119,8 @@ pub fn assemble(
             "prior",
             json!({"file": "prior.safetensors", "vibration": "vibration.safetensors"}),
         ),
-        ("supports", json!(super::fixed::read(work)?)),
+        ("supports", json!(fixed::read(work, fixed::SUPPORTS)?)),
+        ("regions", json!(fixed::read(work, fixed::REGIONS)?)),
         (
             "provenance",
             json!({"command": COMMAND, "version": env!("CARGO_PKG_VERSION"), "options": options.words(), "seed": options.seed}),
@@ -127,8 +129,10 @@ pub fn assemble(
         ("files", Value::Object(files)),
         (DIGEST, json!(blank)),
     ];
-    // A bundle without groups is one that libraries before them read.
-    let is_told = |(name, value): &&(&str, Value)| *name != "supports" || *value != json!([]);
+    // A bundle without groups and regions is one that libraries before them read.
+    let is_told = |(name, value): &&(&str, Value)| {
+        !matches!(*name, "supports" | "regions") || *value != json!([])
+    };
     let lines: Vec<String> = entries
         .iter()
         .filter(is_told)

@@ -1,4 +1,4 @@
-//! What holds an organ: regions, of which those with a name are support groups of the bundle.
+//! What holds an organ, and where pressure acts on it: regions, of which those with a name are support groups and surface regions of the bundle.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -9,8 +9,9 @@ use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use tissue::mesh_import::Region;
 
-/// The groups, in the work folder.
-pub const FILE: &str = "supports.json";
+/// The support groups and the surface regions, in the work folder.
+pub const SUPPORTS: &str = "supports.json";
+pub const REGIONS: &str = "regions.json";
 
 /// `[NAME=]REGION`.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +49,7 @@ impl fmt::Display for Fixed {
     }
 }
 
-/// A support group as `bundle.json` has it.
+/// A support group or a region as `bundle.json` has it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Group {
     pub name: String,
@@ -85,16 +86,50 @@ pub fn groups(fixed: &[Fixed], held: &[Vec<u32>]) -> Result<Vec<Group>> {
     Ok(groups)
 }
 
-/// Writes the groups to the folder of a stage.
-pub fn write(groups: &[Group], folder: &Path) -> Result<()> {
-    let path = folder.join(FILE);
+/// The named regions of a surface `[F]`: the nodes of its triangles whose corners are all among those of a region; regions of one name are one.
+pub fn regions(
+    pressure: &[Fixed],
+    inside: &[Vec<u32>],
+    surface: &[[u32; 3]],
+) -> Result<Vec<Group>> {
+    let mut regions: Vec<Group> = Vec::new();
+    for (pressure, nodes) in pressure.iter().zip(inside) {
+        let Some(name) = &pressure.name else {
+            bail!("--pressure {pressure} has no name; write --pressure NAME={pressure}");
+        };
+        let is_in = |node: &u32| nodes.binary_search(node).is_ok();
+        let faces = surface.iter().filter(|face| face.iter().all(is_in));
+        let own: Vec<u32> = faces.flatten().copied().collect();
+        if own.is_empty() {
+            bail!(
+                "no boundary triangle has all three corners in the region of --pressure {pressure}"
+            );
+        }
+        match regions.iter_mut().find(|region| region.name == *name) {
+            Some(region) => region.nodes.extend(own),
+            None => regions.push(Group {
+                name: name.clone(),
+                nodes: own,
+            }),
+        }
+    }
+    for region in &mut regions {
+        region.nodes.sort_unstable();
+        region.nodes.dedup();
+    }
+    Ok(regions)
+}
+
+/// Writes groups or regions to the folder of a stage.
+pub fn write(groups: &[Group], folder: &Path, file: &str) -> Result<()> {
+    let path = folder.join(file);
     std::fs::write(&path, serde_json::to_vec(groups)?)
         .with_context(|| format!("{}: cannot be written", path.display()))
 }
 
 /// Those of a work folder.
-pub fn read(folder: &Path) -> Result<Vec<Group>> {
-    let path = folder.join(FILE);
+pub fn read(folder: &Path, file: &str) -> Result<Vec<Group>> {
+    let path = folder.join(file);
     let text =
         std::fs::read(&path).with_context(|| format!("{}: cannot be read", path.display()))?;
     serde_json::from_slice(&text).with_context(|| path.display().to_string())
@@ -119,6 +154,16 @@ mod tests {
                 text.starts_with("ligament") || text.starts_with("bed")
             );
         }
+        let pressure = ["a=all", "b=all", "a=all"].map(|text| text.parse().unwrap());
+        let inside = [vec![0, 1, 2, 9], vec![1, 2, 3, 4], vec![2, 3, 4]];
+        let surface = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [4, 5, 6]];
+        let found = regions(&pressure, &inside, &surface).unwrap();
+        assert_eq!(found[0].nodes, [0, 1, 2, 3, 4]);
+        assert_eq!(found[1].nodes, [1, 2, 3, 4]);
+        let none = regions(&pressure, &[vec![0, 1]], &surface).unwrap_err();
+        assert!(none.to_string().contains("no boundary triangle"));
+        let nameless = regions(&["all".parse().unwrap()], &inside, &surface).unwrap_err();
+        assert!(nameless.to_string().contains("NAME=all"));
         assert!("=all".parse::<Fixed>().unwrap_err().contains("no name"));
     }
 

@@ -66,7 +66,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let made = work.stage(
         "body",
         &body_key,
-        &["mesh.safetensors", fixed::FILE],
+        &["mesh.safetensors", fixed::SUPPORTS, fixed::REGIONS],
         |stage| body::make(options, stage),
     );
     let body = match made {

@@ -58,6 +58,10 @@ pub struct Options {
     /// mesh file holds. With NAME= before it the nodes are a support group, which a host moves and lets go apart; of several, a node is the first one's.
     #[arg(long, value_name = "[NAME=]REGION", allow_hyphen_values = true)]
     pub fixed: Vec<Fixed>,
+    /// Part of the surface that the bundle names, on which a host gives a pressure: boundary triangles with all three corners in a region, as of --fixed. May
+    /// be repeated; regions of one name are one, and they may overlap.
+    #[arg(long, value_name = "NAME=REGION", allow_hyphen_values = true)]
+    pub pressure: Vec<Fixed>,
     /// Node sets of a mesh file that are held: `fixed`, or `supported` (both sets; not together with --fixed).
     #[arg(long, default_value = "fixed")]
     pub boundary: Boundary,
@@ -262,20 +266,12 @@ impl Options {
 
     /// What the body depends on besides the input's bytes.
     pub fn body_words(&self) -> Result<String> {
-        let mut words = format!(
-            "{} {} {} {:?} {:?} {:?} {} {}",
-            self.scale()?,
-            self.nodes,
-            self.no_repair,
-            self.name,
-            self.part,
-            self.label,
-            self.refill,
-            self.boundary.as_str()
-        );
-        words += &format!(" {:?}", self.stiffness);
-        words += &format!(" {:?}", self.fixed);
-        let held = self.fixed.iter().map(|fixed| &fixed.region);
+        let mesh = (self.nodes, self.no_repair, &self.name, &self.part);
+        let more = (&self.label, self.refill, self.boundary.as_str());
+        let sets = (&self.stiffness, &self.fixed, &self.pressure);
+        let mut words = format!("{} {mesh:?} {more:?} {sets:?}", self.scale()?);
+        let named = self.fixed.iter().chain(&self.pressure);
+        let held = named.map(|named| &named.region);
         let regions = held.chain([&Region::All]).chain(&self.domain);
         for region in regions.chain(self.stiffness.iter().map(|(region, _)| region)) {
             words += &format!(" {region}");
@@ -296,7 +292,8 @@ impl Options {
             |regions: &[Region]| -> Vec<String> { regions.iter().map(Region::to_string).collect() };
         json!({
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
-            "boundary": self.boundary.as_str(), "fixed": self.fixed.iter().map(Fixed::to_string).collect::<Vec<String>>(), "domain": list(&self.domain), "nodes": self.nodes,
+            "boundary": self.boundary.as_str(), "fixed": self.fixed.iter().map(Fixed::to_string).collect::<Vec<String>>(),
+            "pressure": self.pressure.iter().map(Fixed::to_string).collect::<Vec<String>>(), "domain": list(&self.domain), "nodes": self.nodes,
             "part": self.part, "label": self.label, "refill": self.refill,
             "material": self.material, "relaxation": self.relaxation.to_string(), "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,

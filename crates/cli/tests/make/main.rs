@@ -311,17 +311,17 @@ fn parts_that_the_file_names_are_held_and_stiffer() {
         "group:ligament",
         "--stiffness",
         "ball:0,0,0,15=4",
+        "--pressure",
+        "bed=group:ligament",
         "--preview",
     ];
     let output = command(&surface, &out, &arguments).output().unwrap();
     let said = crate::text(&output);
     assert!(output.status.success(), "{said}");
     assert!(said.contains("4 times the stiffness"), "{said}");
+    assert!(said.contains("region `bed`: "), "{said}");
     let message = refused(&surface, &["--fixed", "group:tendon"]);
-    assert!(
-        message.contains("tendon") && message.contains("ligament"),
-        "{message}"
-    );
+    assert!(message.contains("tendon") && message.contains("ligament"));
 }
 
 #[test]
