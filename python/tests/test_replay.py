@@ -16,7 +16,7 @@ def test_a_recorder_writes_what_the_scene_was_given(tmp_path):
         recorder.step([ball])
         field = recorder.step([ball], loads=upt.Loads(gravity=(0, 0, -1)))
         with pytest.raises(ValueError, match="gravity, and no other load"):
-            recorder.step([ball], loads=upt.Loads(pressures=[upt.Pressure(100.0)]))
+            recorder.step([ball], loads=upt.Loads(pressures=[(None, 100.0)]))
     header, first, second, end = [json.loads(line) for line in place.read_text().splitlines()]
     assert header["portable"] and header["scene"]["corrections"] == 3 and end == {"end": 2}
     assert header["bundle_sha256"] == model.describe()["bundle_sha256"]

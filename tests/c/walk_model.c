@@ -58,9 +58,9 @@ void walk_model_open(const char *bundle, const char *damaged) {
   EXPECT(upt_model_open("no/such/bundle", NULL, &model), UPT_ERR_IO);
   EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_STRUCT_SIZE);
   options.struct_size = sizeof options;
-  options.reserved = 1;
+  options.portable = 2;
   EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
-  options.reserved = 0;
+  options.portable = 0;
   options.fallback = 7;
   EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
   options.fallback = UPT_SWITCH_OFF;
