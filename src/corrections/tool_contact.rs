@@ -40,8 +40,8 @@ const MORE_PRESSES: u32 = 6;
 const MORE_EVALUATIONS: u32 = 6;
 const EVALUATIONS: u32 = 2;
 
-/// Parts of their way at which broad tools stop that thrust farther than the step can follow.
-const STOPS: [f32; 4] = [0.5, 0.25, 0.1, 0.0];
+/// Where broad tools stop that thrust farther than the step can follow, in half thicknesses from where they were.
+const STOPS: [f32; 2] = [0.8, 0.0];
 
 /// How often a step is made again because ties break; what is pulled too hard then breaks in the next.
 const MOST_BREAKS: u32 = 6;
@@ -97,11 +97,11 @@ impl ImplicitSolver {
         };
         let mut report = made(problem, true)?;
         // Tools that no single step follows stop on their way, at last where they were.
-        for part in STOPS {
+        for thicknesses in STOPS {
             if !(problem.is_thrust() && (report.fell_back || problem.has_passed())) {
                 break;
             }
-            problem.stop_at(part);
+            problem.stop_after(thicknesses);
             problem.work.renew();
             report = made(problem, true)?;
         }

@@ -33,10 +33,13 @@ impl ContactProblem {
         way.dot(pushed) > 0.0
     }
 
-    /// Such tools stop at part `part` of their way.
-    pub fn stop_at(&mut self, part: f32) {
+    /// Such tools stop after so many of their half thicknesses.
+    pub fn stop_after(&mut self, thicknesses: f32) {
         for index in 0..self.tools.len() {
             if self.thrusts(index) {
+                let body = &self.tools[index].body;
+                let motion = body.motion(&self.before[index], &self.goals[index]);
+                let part = (thicknesses * body.size() / motion).min(0.5);
                 let at = pose::between(&self.before[index], &self.goals[index], part);
                 self.tools[index].pose = at;
                 self.next.tools[index].pose = at;
