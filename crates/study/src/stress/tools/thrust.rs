@@ -17,7 +17,7 @@ const SLOW_MM: f32 = 0.2;
 const LEAPS: [f32; 3] = [4.0, 6.0, 9.0];
 /// Steps after which the forces are compared, and how far apart they may be.
 const AFTER: usize = 40;
-const APART: f64 = 0.25;
+const APART: f64 = 0.4;
 /// Below this the slow press has slid off, mN.
 const LEAST_MN: f64 = 5.0;
 /// The blade begins where it lies no deeper than this in the tissue at rest, mm.
