@@ -90,6 +90,7 @@ impl ImplicitSolver {
         if whole.fell_back || !helps {
             return Ok(whole);
         }
+        problem.aim();
         let parts = self.drive_substeps(context, input, problem, (substeps, substepper), next)?;
         Ok(whole.and(&parts))
     }

@@ -47,6 +47,13 @@ impl ContactProblem {
         }
     }
 
+    /// All tools are where the host has put them, for a step that is made anew.
+    pub fn aim(&mut self) {
+        for (tool, goal) in self.tools.iter_mut().zip(&self.goals) {
+            tool.pose = *goal;
+        }
+    }
+
     /// A tool that has stopped on its way lies so much deeper in the tissue where the host has it.
     pub fn tell_lag(&mut self) {
         let tools = self.tools.iter().zip(&self.goals);
