@@ -19,9 +19,11 @@ bundle() {
 
 bundle wide wide "$brain" bundle.json
 bundle paper paper "$brain" reference.safetensors --paper-split
-# The trained network of that size, split in the same way.
+# The trained network of that size, split in the same way, where it has been fetched.
 split=$out/brain-paper.split/paper_decoder.onnx
-if [ ! "$split" -nt onnx/brain-paper/decoder.onnx ]; then
+if [ ! -d onnx/brain-paper ]; then
+  echo "left out: brain-paper; fetch it first: upt bundle get brain-paper --out onnx" >&2
+elif [ ! "$split" -nt onnx/brain-paper/decoder.onnx ]; then
   "${UPT_PYTHON:-python3}" -m upt_training.paper_split onnx/brain-paper --out "$out/brain-paper.split"
 fi
 if [ -n "${UPT_FINE_MESH:-}" ]; then bundle paper-fine paper "$UPT_FINE_MESH" reference.safetensors --paper-split; fi

@@ -75,8 +75,10 @@ def organs(to: Path) -> None:
         return
     bundles = CLONE / "onnx"
     shutil.copytree(bundles / ORGAN, to / ORGAN, ignore=shutil.ignore_patterns("*.html"))
+    assets = json.loads((bundles / "index.json").read_text(encoding="utf-8"))["assets"]
     found = sorted(bundles.glob("*/bundle.json"))
-    index = {file.parent.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in found}
+    index = {name: one["sha256"] for name, one in assets.items()}
+    index |= {file.parent.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in found}
     (to / "index.json").write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
 
 

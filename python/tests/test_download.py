@@ -82,6 +82,8 @@ def test_a_download_says_what_it_lacks(mirror, monkeypatch):
 @pytest.mark.skipif(not bundles.ORGANS.is_dir(), reason="not from a wheel")
 def test_the_wheel_knows_the_bundles_of_its_day(mirror, monkeypatch):
     monkeypatch.setenv("UPT_MIRROR", str(ROOT / "onnx"))
-    folder = upt.download("brain-coarse-paper")  # its body lies with another bundle
-    assert digest(folder / "bundle.json") == digest(ROOT / "onnx" / "brain-coarse-paper" / "bundle.json")
+    folder = upt.download("brain-fast")  # its body lies with another bundle
+    assert digest(folder / "bundle.json") == digest(ROOT / "onnx" / "brain-fast" / "bundle.json")
+    with pytest.raises(OSError, match=r"brain-paper"):  # known, and not on this mirror
+        upt.download("brain-paper")
     assert upt.Model(upt.bundle("liver-coarse")).node_count == 1178

@@ -33,8 +33,10 @@ def row(manifest: Path) -> str:
 
 
 def table() -> str:
-    """All bundles that ship, by name."""
-    rows = [row(manifest) for manifest in sorted(ROOT.glob("onnx/*/bundle.json"))]
+    """All bundles that a clone holds, by name; none that was fetched beside them."""
+    assets = json.loads((ROOT / "onnx/index.json").read_text(encoding="utf-8"))["assets"]
+    here = sorted(ROOT.glob("onnx/*/bundle.json"))
+    rows = [row(manifest) for manifest in here if manifest.parent.name not in assets]
     return "\n".join([HEAD, "|---|---|---:|---|---:|---:|---:|---:|", *rows]) + "\n"
 
 

@@ -99,7 +99,7 @@ fn look(options: &Options) -> Findings {
 }
 
 /// The bundles of where this is: of the folder at hand, of the clone that this program was built in, of the archive that it came in.
-fn usual_bundles() -> Vec<PathBuf> {
+pub(crate) fn usual_bundles() -> Vec<PathBuf> {
     let exe = std::env::current_exe().ok();
     let below = |up: usize, place: &str| Some(exe.as_ref()?.ancestors().nth(up)?.join(place));
     // target/release/upt of a clone, bin/upt of an archive.

@@ -4,6 +4,7 @@
 //! Exit codes: 0 done; 1 the command ran and its finding is bad (`doctor`, `check`); 2 wrong usage or
 //! input, with a message on stderr that says what to do.
 
+pub mod bundle;
 pub mod bundle_folder;
 #[cfg(feature = "linear")]
 pub mod check;

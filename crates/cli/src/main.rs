@@ -10,11 +10,11 @@ use clap::{Parser, Subcommand};
 use upt_cli::export;
 #[cfg(not(feature = "linear"))]
 use upt_cli::left_out;
+use upt_cli::{
+    bundle, dataset, doctor, fit, loads, materials, mesh, replay, rollout, runtime, simulate, view,
+};
 #[cfg(feature = "linear")]
 use upt_cli::{check, corrections, make, modes, prior, validate};
-use upt_cli::{
-    dataset, doctor, fit, loads, materials, mesh, replay, rollout, runtime, simulate, view,
-};
 
 /// Names what a build leaves out; `cargo xtask demo` builds without what it does not need.
 const VERSION: &str = match (cfg!(feature = "files"), cfg!(feature = "linear")) {
@@ -68,6 +68,8 @@ enum Command {
     Check(left_out::Options),
     /// Show what is on this machine: ONNX Runtime, providers, CPU features, bundles.
     Doctor(doctor::Options),
+    /// List bundles, and fetch those that a clone does not hold.
+    Bundle(bundle::Options),
     /// Fetch ONNX Runtime for this user.
     Runtime(runtime::Options),
     /// Inspect, import and fill meshes.
@@ -139,6 +141,7 @@ fn main() -> ExitCode {
         #[cfg(not(feature = "linear"))]
         Command::Check(options) => left_out::run("linear", &options),
         Command::Doctor(options) => doctor::run(&options),
+        Command::Bundle(options) => bundle::run(&options),
         Command::Runtime(options) => runtime::run(&options),
         Command::Mesh(options) => mesh::run(&options),
         #[cfg(feature = "files")]
