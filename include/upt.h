@@ -387,6 +387,11 @@
 #define UPT_VIEW_POINTS 1
 
 /**
+ * The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.
+ */
+#define UPT_VIEW_SURFACE 2
+
+/**
  * An instrument's shape: a capsule along local y.
  */
 #define UPT_SHAPE_CAPSULE 0
@@ -2222,14 +2227,15 @@ upt_status upt_scene_surface_positions(struct upt_scene *scene,
  *   those of the step. Neither `displacement` nor `time_s` may be set. NULL: nothing touches the tissue.
  * - `when`: the moment on the clock of the steps' `time_s`, s, not before that of the last published step; for hosts whose steps have
  *   no time, the time since the last published step. Velocities are followed for two steps at most.
- * - `view`: the region or the attached points; NULL: the region.
+ * - `view`: the region, the attached points, or the vertices of the surface, `rest + out` of `upt_scene_surface`; NULL: the region.
  * - `out`: `[n,3]`, mm, in the view's order.
  * - `out_count`: number of floats in `out`, 3 n.
  *
  * Threads: one thread at a time presents; another may step or submit meanwhile.
  * Errors: `UPT_ERR_BUSY` while another thread presents, and if a step is in flight at the first call;
  * `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", for a bundle without a linear response or corrections, and
- * for a scene without corrections; `UPT_ERR_STATE` for the points when none are attached; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
+ * for a scene without corrections; `UPT_ERR_STATE` for the points when none are attached, and for the
+ * surface where the body has changed since the last `upt_scene_update_surface`; `UPT_ERR_UNSUPPORTED` for the surface of a scene with a region; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
  * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`,
  * `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
  */

@@ -231,6 +231,8 @@ class ViewKind(IntEnum):
     """The region's nodes in its order; all nodes where there is no region."""
     POINTS = 1
     """The attached points."""
+    SURFACE = 2
+    """The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too."""
 
 
 class Shape(IntEnum):

@@ -234,7 +234,8 @@ class Scene(Cuts, Ties):
                 Velocities are followed for two steps at most.
             instruments: as in `step`, where they are at that moment.
             contacts: as in `step`, where the nodes are at that moment, for scenes that nodes drive.
-            view: `upt.ViewKind` or its name: region or points.
+            view: `upt.ViewKind` or its name: region, points, or surface: the vertices of the last `surface`, each from
+                its place at rest.
             out: `[n, 3]` to write to, in the view's order.
 
         Returns:
@@ -242,12 +243,15 @@ class Scene(Cuts, Ties):
 
         Raises:
             upt.UnsupportedError: the scene has no linear response or does not correct; use `sample`.
+            upt.StateError: the body has changed since its `surface` was asked for.
         """
         at, _, kept = self._inputs.place(instruments, contacts, None, None, 0.0)
         seen = View(kind=view)
         count, places = self._out_count, self._frames
         if seen.kind == ViewKind.POINTS:
             count, places = self._point_count, self._others
+        elif seen.kind == ViewKind.SURFACE:
+            count, places = self._vertex_count, self._others
         result, place, length, _ = places.place(out, count)
         check(lib.upt_scene_present(self._handle, at, number(when, "when"), ctypes.byref(seen), place, length))
         return result

@@ -127,6 +127,8 @@ pub const UPT_SET_TETS: i32 = 5;
 pub const UPT_VIEW_REGION: i32 = 0;
 /// The attached points.
 pub const UPT_VIEW_POINTS: i32 = 1;
+/// The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.
+pub const UPT_VIEW_SURFACE: i32 = 2;
 
 /// An instrument's shape: a capsule along local y.
 pub const UPT_SHAPE_CAPSULE: i32 = 0;

@@ -241,6 +241,7 @@ pub(super) unsafe fn read_view(raw: *const upt_view) -> Result<View, Failure> {
     match raw.kind {
         UPT_VIEW_REGION => Ok(View::Region),
         UPT_VIEW_POINTS => Ok(View::Points),
+        UPT_VIEW_SURFACE => Ok(View::Surface),
         value => convert::unknown("view.kind", value),
     }
 }

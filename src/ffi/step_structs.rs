@@ -256,6 +256,11 @@ impl upt_view {
         struct_size: size_of::<upt_view>() as u32,
         kind: super::constants::UPT_VIEW_POINTS,
     };
+    /// The vertices of the surface.
+    pub const SURFACE: upt_view = upt_view {
+        struct_size: size_of::<upt_view>() as u32,
+        kind: super::constants::UPT_VIEW_SURFACE,
+    };
 }
 
 /// The convex hull of a tool's points. Immutable; any number of threads may use it at once.

@@ -1,9 +1,12 @@
 //! The closed surface of a body that is cut, as a host follows it: what changed since it last asked, and where its vertices are.
 
+use std::sync::Arc;
+
 use super::Scene;
 use super::core::{Core, lock_read};
 use super::followed_surface::{self, Followed};
-use super::published::BodyNumber;
+use super::points::AttachedPoints;
+use super::published::{BodyNumber, Published};
 use super::shared::lock;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -119,25 +122,7 @@ impl Scene {
         let held = lock(&self.tools.surface)?;
         let own = held.as_ref().ok_or_else(not_asked)?;
         let shown = lock_read(&self.shared.published);
-        if !own.is_of(shown.body) {
-            return Err(Error::State(
-                "surface: the body has changed since its surface was updated; update it first"
-                    .into(),
-            ));
-        }
-        if shown.region.is_some() {
-            return Err(Error::Unsupported(
-                "surface: a scene with a region decodes its nodes alone; take the region off first"
-                    .into(),
-            ));
-        }
-        if out.len() != 3 * own.rest.len() {
-            return Err(Error::Argument(format!(
-                "out has {} floats, must have {}: 3 for each vertex of the surface",
-                out.len(),
-                3 * own.rest.len()
-            )));
-        }
+        own.check(&shown, out.len())?;
         let moved = shown.last.field.as_chunks::<3>().0;
         let vertices = own.surface.vertices.iter().zip(&own.rest);
         out.write_rows(vertices.map(|(vertex, rest)| {
@@ -153,10 +138,46 @@ impl Scene {
         Ok(())
     }
 
+    /// The vertices as points on nodes, for frames of `len` floats. No body changes while frames are held.
+    ///
+    /// # Errors
+    /// As [`Scene::surface_positions`].
+    pub(super) fn surface_points(&self, len: usize) -> Result<Arc<AttachedPoints>> {
+        let mut held = lock(&self.tools.surface)?;
+        let own = held.as_mut().ok_or_else(not_asked)?;
+        own.check(&lock_read(&self.shared.published), len)?;
+        own.points()
+    }
+
     /// Bytes of the surface that a host follows.
     pub(super) fn surface_bytes(&self) -> usize {
         let held = lock(&self.tools.surface);
         held.map_or(0, |held| held.as_ref().map_or(0, Followed::held_bytes))
+    }
+}
+
+impl Followed {
+    /// Whether it is the surface of the body that is shown, with all its nodes, and an output of `len` floats has its size.
+    fn check(&self, shown: &Published, len: usize) -> Result<()> {
+        if !self.is_of(shown.body) {
+            return Err(Error::State(
+                "surface: the body has changed since its surface was updated; update it first"
+                    .into(),
+            ));
+        }
+        if shown.region.is_some() {
+            return Err(Error::Unsupported(
+                "surface: a scene with a region decodes its nodes alone; take the region off first"
+                    .into(),
+            ));
+        }
+        if len == 3 * self.rest.len() {
+            return Ok(());
+        }
+        Err(Error::Argument(format!(
+            "out has {len} floats, must have {}: 3 for each vertex of the surface",
+            3 * self.rest.len()
+        )))
     }
 }
 

@@ -1,7 +1,10 @@
 //! What a scene keeps of the surface that a host follows.
 
+use std::sync::Arc;
+
 use topology::{Body, RestMesh, Surface};
 
+use super::points::AttachedPoints;
 use super::published::BodyNumber;
 use crate::bundle::Mesh;
 use crate::error::Result;
@@ -22,6 +25,8 @@ pub struct Followed {
     untold: Vec<u32>,
     /// The host has not been told of any of it.
     is_new: bool,
+    /// Its vertices as points on nodes, once frames show them.
+    points: Option<Arc<AttachedPoints>>,
 }
 
 impl Followed {
@@ -34,6 +39,7 @@ impl Followed {
             changed: Vec::new(),
             untold: Vec::new(),
             is_new: true,
+            points: None,
         })
     }
 
@@ -44,6 +50,7 @@ impl Followed {
 
     /// Follows the body, whose nodes are those of `mesh`. Returns the first new vertex, and whether all are new. After an error another call goes on.
     pub fn follow(&mut self, body: &Body, mesh: &Mesh) -> Result<(usize, bool)> {
+        self.points = None;
         let mut change = self.surface.update(body)?.triangles;
         if self.untold.is_empty() {
             std::mem::swap(&mut self.untold, &mut change);
@@ -77,8 +84,21 @@ impl Followed {
         Ok((if is_new { 0 } else { first }, is_new))
     }
 
+    /// Its vertices as points on nodes.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory).
+    pub fn points(&mut self) -> Result<Arc<AttachedPoints>> {
+        let points = match self.points.take() {
+            Some(points) => points,
+            None => Arc::new(AttachedPoints::on_nodes(&self.surface.vertices)?),
+        };
+        Ok(Arc::clone(self.points.insert(points)))
+    }
+
     /// Bytes of the heap, nearly: a vertex is in the list, in the map by nodes and in `rest`, a triangle in two lists.
     pub fn held_bytes(&self) -> usize {
-        160 * self.rest.len() + 20 * self.surface.triangles.len()
+        let points = self.points.as_ref().map_or(0, |points| 32 * points.len());
+        160 * self.rest.len() + 20 * self.surface.triangles.len() + points
     }
 }

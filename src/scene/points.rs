@@ -4,6 +4,7 @@
 //! that is [`REACH`] or more away is refused, because a mesh in other axes or units is a mistake, not a surface.
 
 use topology::Body;
+use topology::surface::{NONE, Vertex};
 
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
@@ -112,6 +113,33 @@ impl AttachedPoints {
             places: memory::copied(&self.places, WHAT)?,
             queries: memory::copied(&self.queries, WHAT)?,
             rows: memory::copied(&self.rows, WHAT)?,
+        })
+    }
+
+    /// Points at fixed weights on nodes, such as the vertices of a surface: up to four nodes each, [`NONE`] for less.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn on_nodes(vertices: &[Vertex]) -> Result<AttachedPoints> {
+        let all = |vertex: &Vertex| {
+            vertex
+                .nodes
+                .map(|node| if node == NONE { vertex.nodes[0] } else { node })
+        };
+        let nodes = vertices.iter().map(all);
+        let weights = vertices.iter().map(|vertex| {
+            [0, 1, 2, 3].map(|k| {
+                if vertex.nodes[k] == NONE {
+                    0.0
+                } else {
+                    vertex.weights[k] as f32
+                }
+            })
+        });
+        Ok(AttachedPoints {
+            nodes: memory::collected(vertices.len(), nodes, WHAT)?,
+            weights: memory::collected(vertices.len(), weights, WHAT)?,
+            ..AttachedPoints::default()
         })
     }
 

@@ -2,7 +2,7 @@
 //!
 //! REQ-052: The arrival of a step moves no frame at its moment.
 
-use std::sync::RwLock;
+use std::sync::{Arc, RwLock};
 
 use super::core::{Core, lock_read, lock_write};
 use super::frame_state::FrameState;
@@ -41,7 +41,7 @@ impl Scene {
     /// [`Error::NonFinite`] and [`Error::Argument`] for `when`, an instrument or nodes that are not of the mesh or there twice, and for an
     /// input with a displacement or a time, [`Error::Unsupported`] for a bundle without linear response or corrections or a scene
     /// that does not correct, [`Error::Busy`] while another thread presents, and at the first call while a step is in flight,
-    /// [`Error::State`] for the points where none are attached.
+    /// [`Error::State`] for the points where none are attached, and for the surface where the body has changed since its update.
     pub fn present<'a>(
         &self,
         input: impl Into<StepInput<'a>>,
@@ -65,9 +65,16 @@ impl Scene {
         }
         input.check_of_frame()?;
         supports::check(input.loads.supports, &self.mesh.supports)?;
-        lock_read(&self.shared.published).check_len(view, out.len())?;
+        if view != View::Surface {
+            lock_read(&self.shared.published).check_len(view, out.len())?;
+        }
         let _mode = FlushToZero::of(self.model.isa);
         let mut presenters = lock(&self.tools.presenters)?;
+        let attached = match view {
+            View::Region => None,
+            View::Points => Some(Arc::clone(&lock_read(&self.shared.published).attached)),
+            View::Surface => Some(self.surface_points(out.len())?),
+        };
         // While frames are held no body changes.
         let cut = lock_read(&self.shared.published).cut.clone();
         let model = cut.as_ref().map_or(&self.model, |cut| &cut.0);
@@ -89,7 +96,7 @@ impl Scene {
             contact: input.contact,
             supports: input.loads.supports,
         };
-        presenters.frame(&tissue, (view, when), driven, out)
+        presenters.frame(&tissue, (view, when), driven, (attached, out))
     }
 
     /// Bytes of what presents.

@@ -36,6 +36,8 @@ impl Frame {
         match view {
             View::Points => &self.points,
             View::Region => &self.field,
+            // No buffer has passed `check_len`.
+            View::Surface => &[],
         }
     }
 
@@ -60,6 +62,9 @@ pub enum View {
     Region,
     /// The attached points.
     Points,
+    /// The vertices of the body's surface as [`Scene::update_surface`](crate::Scene::update_surface) left it, each from its place at rest: in frames
+    /// between steps. Where they are in the last state [`Scene::surface_positions`](crate::Scene::surface_positions) tells.
+    Surface,
 }
 
 /// The model of a cut body, for those who read its states.
@@ -105,6 +110,7 @@ impl Published {
     /// Nodes or points of a view.
     pub fn count(&self, view: View) -> usize {
         match (view, &self.region) {
+            (View::Surface, _) => 0,
             (View::Points, _) => self.last.points.len() / 3,
             (View::Region, Some(region)) => region.len(),
             (View::Region, None) => self.last.field.len() / 3,
@@ -114,6 +120,11 @@ impl Published {
     /// The size that a host's buffer must have.
     pub fn check_len(&self, view: View, len: usize) -> Result<()> {
         let want = 3 * self.count(view);
+        if view == View::Surface {
+            return Err(Error::Unsupported(
+                "the surface of a state is upt_scene_surface_positions; only frames between steps have it as a view".into(),
+            ));
+        }
         if view == View::Points && want == 0 {
             return Err(Error::State(
                 "no points are attached; attach them first".into(),
@@ -123,8 +134,8 @@ impl Published {
             return Ok(());
         }
         let what = match view {
-            View::Region => "the region's nodes",
             View::Points => "the attached points",
+            View::Region | View::Surface => "the region's nodes",
         };
         Err(Error::Argument(format!(
             "out has {len} floats, must have {want}: 3 for each of {what}"

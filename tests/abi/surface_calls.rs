@@ -65,7 +65,7 @@ impl World<'_> {
     }
 
     /// Vertices, triangles and changes of the surface, where the scene tells; asking for it drops the list of changes.
-    fn counts(scene: *mut upt_scene) -> [usize; 3] {
+    pub(super) fn counts(scene: *mut upt_scene) -> [usize; 3] {
         let mut out: upt_surface = unsafe { std::mem::zeroed() };
         out.struct_size = size_of::<upt_surface>() as u32;
         match unsafe { upt_scene_update_surface(scene, &mut out) } {

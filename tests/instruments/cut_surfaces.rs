@@ -5,8 +5,8 @@ use std::ptr::null_mut;
 
 use super::cuts::{liver, options, slit};
 use super::*;
-use upt::Error;
 use upt::ffi::*;
+use upt::{Error, View};
 
 /// What a host keeps of a surface, from the C interface.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -66,6 +66,26 @@ fn volume(triangles: &[[u32; 3]], positions: &[f32]) -> f64 {
     parts
         .map(|[a, b, c]| f64::from(a.dot(b.cross(c))) / 6.0)
         .sum()
+}
+
+/// A frame of the surface at the moment of a step is the state's, one after it is near, and there is none of another length.
+fn assert_frames_start_from_the_state(scene: &Scene, tool: &Tool, rest: &[f32], at: &[f32]) {
+    let tools = std::slice::from_ref(tool);
+    let mut u = vec![0.0; rest.len()];
+    for (seconds, bound) in [(0.0, 1e-3), (0.02, 1.0)] {
+        let made = scene.present(Contact::Tools(tools), seconds, View::Surface, &mut u);
+        made.unwrap();
+        let off = rest
+            .iter()
+            .zip(&u)
+            .zip(at)
+            .map(|((rest, u), at)| (rest + u - at).abs());
+        let worst = off.fold(0.0, f32::max);
+        assert!(worst < bound, "{worst} mm at {seconds} s");
+    }
+    let short = &mut u[3..];
+    let refused = scene.present(Contact::None, 0.0, View::Surface, short);
+    assert!(matches!(refused, Err(Error::Argument(_))), "{refused:?}");
 }
 
 #[test]
@@ -155,6 +175,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         let mut in_rust = vec![0.0; at.len()];
         own.surface_positions(&mut in_rust).unwrap();
         assert_eq!(bits(&at), bits(&in_rust));
+        assert_frames_start_from_the_state(&own, &tool, &now.rest, &at);
         for (k, position) in at[..whole.rest.len()].iter().enumerate() {
             assert!((position - whole.rest[k] - u[k]).abs() < 1e-4);
         }
@@ -185,6 +206,9 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         upt_model_close(model);
     }
     own.reset().unwrap();
+    let mut at = vec![0.0; 3 * own.node_count()];
+    let stale = own.present(Contact::None, 0.0, View::Surface, &mut at);
+    assert!(matches!(stale, Err(Error::State(_))), "{stale:?}");
     own.set_region(Some(&[1])).unwrap();
     let update = own.update_surface().unwrap();
     let mut at = vec![0.0; 3 * update.vertices];

@@ -76,6 +76,7 @@ export const UPT_SET_DOMAIN_FACES = 4;
 export const UPT_SET_TETS = 5;
 export const UPT_VIEW_REGION = 0;
 export const UPT_VIEW_POINTS = 1;
+export const UPT_VIEW_SURFACE = 2;
 export const UPT_SHAPE_CAPSULE = 0;
 export const UPT_SHAPE_BOX = 1;
 export const UPT_SHAPE_SPATULA = 2;

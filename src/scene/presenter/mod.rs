@@ -33,18 +33,17 @@ use step_blend::StepBlend;
 pub struct Presenters {
     region: Option<Box<Presenter>>,
     points: Option<Box<Presenter>>,
+    surface: Option<Box<Presenter>>,
     /// The contact of a frame, for both.
     solves: Solves,
 }
 
-/// What makes frames of the region, or of the attached points.
+/// What makes frames of the region, or of points at fixed weights on nodes: attached ones, the vertices of the surface.
 #[derive(HeldBytes)]
 struct Presenter {
-    /// What it shows: the region, or the attached points by the nodes around them.
+    /// What it shows by the nodes around them; none: the region.
     #[held(skip)]
-    view: View,
-    #[held(skip)]
-    attached: Arc<AttachedPoints>,
+    attached: Option<Arc<AttachedPoints>>,
     between: Between,
     /// The region and its rows.
     region: Vec<u32>,
@@ -73,16 +72,17 @@ impl Presenters {
         let place = match view {
             View::Region => &mut self.region,
             View::Points => &mut self.points,
+            View::Surface => &mut self.surface,
         };
         if place.is_none() {
-            let made = memory::boxed(Presenter::new(scene, view)?, WHAT)?;
+            let made = memory::boxed(Presenter::new(scene)?, WHAT)?;
             begin()?;
             *place = Some(made);
         }
         Ok(())
     }
 
-    /// The view at `when`, into `out`. Nothing happens before [`Presenters::prepare`].
+    /// The view at `when`, into `out`; where it is one of points, these. Nothing happens before [`Presenters::prepare`].
     ///
     /// # Errors
     /// Those of [`Scene::present`](crate::Scene::present).
@@ -91,24 +91,24 @@ impl Presenters {
         scene: &Tissue<'_>,
         (view, when): (View, f64),
         driven: FrameInput<'_>,
-        out: Output<'_, f32>,
+        (attached, out): (Option<Arc<AttachedPoints>>, Output<'_, f32>),
     ) -> Result<()> {
         let presenter = match view {
             View::Region => &mut self.region,
             View::Points => &mut self.points,
+            View::Surface => &mut self.surface,
         };
         match presenter {
-            Some(presenter) => presenter.frame(scene, when, driven, &mut self.solves, out),
+            Some(own) => own.frame(scene, when, driven, &mut self.solves, (attached, out)),
             None => Ok(()),
         }
     }
 }
 
 impl Presenter {
-    fn new(scene: &Tissue<'_>, view: View) -> Result<Presenter> {
+    fn new(scene: &Tissue<'_>) -> Result<Presenter> {
         Ok(Presenter {
-            view,
-            attached: Arc::default(),
+            attached: None,
             between: Between::new(scene)?,
             region: Vec::new(),
             plan: RowPlan::default(),
@@ -121,14 +121,25 @@ impl Presenter {
     }
 
     /// Takes the nodes of the host's output of `len` floats.
-    fn take_region(&mut self, model: &Model, shared: &Published, len: usize) -> Result<()> {
-        shared.check_len(self.view, len)?;
+    fn take_region(
+        &mut self,
+        model: &Model,
+        shared: &Published,
+        attached: Option<Arc<AttachedPoints>>,
+        len: usize,
+    ) -> Result<()> {
+        if attached.is_none() {
+            shared.check_len(View::Region, len)?;
+        }
         let count = self.between.free.len() / 3;
         let wanted = shared.region.as_deref();
-        let same = match (self.view, wanted) {
-            (View::Points, _) => Arc::ptr_eq(&self.attached, &shared.attached),
-            (View::Region, Some(region)) => self.region == region,
-            (View::Region, None) => self.region.len() == count && self.region.is_sorted(),
+        let same = match (&attached, wanted) {
+            (Some(points), _) => self
+                .attached
+                .as_ref()
+                .is_some_and(|own| Arc::ptr_eq(own, points)),
+            (None, Some(region)) => self.region == region,
+            (None, None) => self.region.len() == count && self.region.is_sorted(),
         };
         if same && !self.region.is_empty() {
             return Ok(());
@@ -136,15 +147,15 @@ impl Presenter {
         let Some(prior) = &model.prior else {
             return Ok(());
         };
-        let region = match (self.view, wanted) {
-            (View::Points, _) => {
-                let mut nodes = memory::copied(shared.attached.needed_nodes(), WHAT)?;
+        let region = match (&attached, wanted) {
+            (Some(points), _) => {
+                let mut nodes = memory::copied(points.needed_nodes(), WHAT)?;
                 nodes.sort_unstable();
                 nodes.dedup();
                 nodes
             }
-            (View::Region, Some(region)) => memory::copied(region, WHAT)?,
-            (View::Region, None) => memory::collected(count, 0..count as u32, WHAT)?,
+            (None, Some(region)) => memory::copied(region, WHAT)?,
+            (None, None) => memory::collected(count, 0..count as u32, WHAT)?,
         };
         // All of it is there before any of it changes.
         let plan = RowPlan::try_region(&prior.basis(), &region, true)?;
@@ -154,9 +165,7 @@ impl Presenter {
         (self.moved, self.shown, self.nodal) = (moved, shown, nodal);
         self.plan = plan;
         self.region = region;
-        if self.view == View::Points {
-            self.attached = Arc::clone(&shared.attached);
-        }
+        self.attached = attached;
         self.between.step = None;
         Ok(())
     }
@@ -168,12 +177,12 @@ impl Presenter {
         when: f64,
         driven: FrameInput<'_>,
         solves: &mut Solves,
-        out: Output<'_, f32>,
+        (attached, out): (Option<Arc<AttachedPoints>>, Output<'_, f32>),
     ) -> Result<()> {
         let step_s = scene.integrator.step_s;
         let (step, tau) = {
             let shared = lock_read(scene.published);
-            self.take_region(scene.model, &shared, out.len())?;
+            self.take_region(scene.model, &shared, attached, out.len())?;
             step_before(&shared, when)?
         };
         let mut nodal = std::mem::take(&mut self.nodal);
@@ -198,15 +207,15 @@ impl Presenter {
             Ok(())
         });
         if made.is_ok() {
-            match self.view {
-                View::Region => out.copy_from(&nodal),
-                View::Points => {
+            match &self.attached {
+                None => out.copy_from(&nodal),
+                Some(attached) => {
                     let field = &mut self.between.free;
                     for (u, &node) in nodal.as_chunks::<3>().0.iter().zip(&self.region) {
                         field[3 * node as usize..][..3].copy_from_slice(u);
                     }
                     let out = out.filled(0.0);
-                    self.attached.add_interpolated(1.0, field, out);
+                    attached.add_interpolated(1.0, field, out);
                 }
             }
         }
