@@ -59,6 +59,8 @@ def test_a_scene_is_cut_and_its_surface_follows(liver):
         assert u.shape == (scene.node_count, 3)
         at = scene.surface_positions()
         np.testing.assert_allclose(at[: liver.node_count], liver.positions + u[: liver.node_count], atol=1e-4)
+        frame = scene.present(0.0, [ball], view="surface")
+        np.testing.assert_allclose(now.rest + frame, at, atol=1e-3)
         ball.position = pressing(liver, 8.0)
         assert scene.remove(ball, 30.0).removed_mm3 == pytest.approx(30.0, rel=0.2)
         assert scene.scale_stiffness([0, 1], 2.0).node_count == scene.node_count
@@ -71,6 +73,14 @@ def test_a_scene_is_cut_and_its_surface_follows(liver):
         assert scene.node_count > liver.node_count and scene.step().shape == (scene.node_count, 3)
         scene.reset()
         assert scene.step(displacement=np.zeros((liver.node_count, 3), np.float32)).shape == (liver.node_count, 3)
+
+
+def test_a_blade_feels_what_it_lays_open(liver):
+    with liver.scene(corrections=5) as scene:
+        blade = upt.Blade(fracture_energy=25.0)
+        done = scene.cut(slit(liver, 6.0, 12.0), blade=blade)
+        assert 25.0 * done.area_mm2 / 18.0 == pytest.approx(float(np.linalg.norm(done.force)), rel=0.3)
+        assert [name for name in upt.__all__ if not hasattr(upt, name)] == []
 
 
 def test_what_cannot_be_cut_says_so(liver):

@@ -43,7 +43,7 @@ from upt._native import (
 )
 from upt.batch import BatchedScenes
 from upt.bundles import bundle
-from upt.cuts import Surface
+from upt.cuts import Blade, Surface
 from upt.download import download
 from upt.errors import (
     ArgumentError,
@@ -85,8 +85,8 @@ def shutdown() -> None:
 __all__ = [
     "ABI_VERSION",
     "ArgumentError",
-    "Blade",
     "BatchedScenes",
+    "Blade",
     "BundleError",
     "BusyError",
     "Cut",
