@@ -29,6 +29,7 @@ class RawClient:
         lines += [f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}", "Sec-WebSocket-Version: 13"]
         if origin:
             lines.append(f"Origin: {f'http://{own}' if origin == 'same' else origin}")
+        self.told: list[tuple[dict, bytes]] = []  # what came before frames
         self.socket = socket.create_connection(("127.0.0.1", port), timeout=30)
         self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
         self.data = b""

@@ -20,7 +20,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from client import Browser
-from run import server
+from running import server
 
 ROOT = Path(__file__).resolve().parents[2]
 MARK = "tests/view/measure.py"

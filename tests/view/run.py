@@ -17,37 +17,18 @@ import struct
 import subprocess
 import sys
 import tempfile
-import time
 import traceback
 import urllib.error
 import urllib.request
-from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 from client import Browser, RawClient, Refused
+from running import COMMAND, ROOT, TOOL, connect_when_free, frame, pressing, server, take, tip_of_the_phantom
+from surgery import a_blade_cuts_and_undo_heals, the_mouse_operates
 
-ROOT = Path(__file__).resolve().parents[2]
-COMMAND = os.environ.get("UPT_COMMAND", str(ROOT / "target/release/upt"))
 STUDY = os.environ.get("UPT_STUDY", str(ROOT / "target/release/upt-study"))
 BUNDLES = Path(os.environ.get("UPT_BUNDLES", ROOT / "onnx"))
 PICTURES = Path(os.environ.get("UPT_BUILD_DIR", ROOT / "target")) / "view"
-TOOL = {"position": [0, 0, 0], "rotation": [0, 0, 0, 1], "radius": 5, "half_length": 20, "friction": 0.3}
-
-
-@contextmanager
-def server(bundle: Path, *more: str):
-    """Port and token of a running `upt view`."""
-    command = [COMMAND, "view", str(bundle), *more]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    try:
-        address = process.stdout.readline().strip()
-        rest, token = address.split("/?token=")
-        yield int(rest.rsplit(":", 1)[1]), token
-        assert process.poll() is None, "the server has ended"
-    finally:
-        process.kill()
-        process.wait()
 
 
 def status_of(port: int, path: str, host: str | None = None) -> int:
@@ -151,47 +132,6 @@ def a_bad_message_closes_its_client_alone():
         assert largest > 1.0, f"{largest} mm"
 
 
-class Frame(NamedTuple):
-    """What the tests read of a frame; see protocol.rs."""
-
-    sequence: int
-    steps: int
-    largest: float
-    force: tuple[float, float, float]
-
-
-def take(client: RawClient) -> Frame:
-    opcode, data = client.read()
-    assert opcode == 2, (opcode, data[:200])
-    words, numbers = struct.unpack("<24I", data[:96]), struct.unpack("<24f", data[:96])
-    return Frame(words[0], words[11], numbers[9], numbers[6:9])
-
-
-def frame(client: RawClient, tool: dict | None, sequence: int) -> Frame:
-    """Asks for a frame with the tool there, and reads it."""
-    client.send(json.dumps({"tool": tool, "sequence": sequence}).encode())
-    return take(client)
-
-
-def tip_of_the_phantom(client: RawClient) -> list[float]:
-    """The node in the middle of the upper side, from the first two messages."""
-    hello = json.loads(client.read()[1])
-    geometry = client.read()[1]
-    n = hello["surface_node_count"]
-    rest = struct.unpack(f"<{3 * n}f", geometry[: 12 * n])
-    nodes = [rest[3 * i : 3 * i + 3] for i in range(n)]
-    top = max(node[2] for node in nodes)
-    upper = [node for node in nodes if node[2] == top]
-    x, y, _ = min(upper, key=lambda node: abs(node[0] - 30) + abs(node[1] - 30))
-    return [x, y, top]
-
-
-def pressing(top: list[float], depth: float) -> dict:
-    """The tool, standing on its axis, its tip so deep below a place of the upper side."""
-    x, y, z = top
-    return TOOL | {"position": [x, y, z + 25.0 - depth], "rotation": [0.70710678, 0, 0, 0.70710678]}
-
-
 def a_flood_of_messages_gets_one_answer_for_many():
     with server(ROOT / "tests/fixtures/tiny-reduced") as (port, token):
         client = RawClient(port, f"/socket?token={token}")
@@ -236,16 +176,6 @@ def a_replay_makes_the_steps_of_the_recording_again():
         assert len(common) >= 15, f"{len(common)} of {len(moving)} states came again"
         order = [again.index(state) for state in common]
         assert order == sorted(order)
-
-
-def connect_when_free(port: int, token: str) -> RawClient:
-    """The place of a client that has just gone is free a moment later."""
-    for _ in range(500):
-        try:
-            return RawClient(port, f"/socket?token={token}")
-        except Refused:
-            time.sleep(0.02)
-    raise AssertionError("the place never became free")
 
 
 def a_drag_moves_the_surface(browser: Browser, bundle: str):
@@ -364,6 +294,7 @@ def main() -> int:
         a_bad_message_closes_its_client_alone,
         a_flood_of_messages_gets_one_answer_for_many,
         a_replay_makes_the_steps_of_the_recording_again,
+        a_blade_cuts_and_undo_heals,
     ]
     passed = failed = skipped = 0
     try:
@@ -375,6 +306,7 @@ def main() -> int:
     runs = [(test.__name__, test) for test in tests]
     if browser:
         runs.append(("a_drag_moves_the_surface", lambda: a_drag_moves_the_surface(browser, "brain-reduced")))
+        runs.append(("the_mouse_operates", lambda: the_mouse_operates(browser, BUNDLES / "brain-reduced", PICTURES)))
         runs.append(("a_report_plays_its_first_case", lambda: a_report_plays_its_first_case(browser, "liver-coarse")))
         runs.append(("a_report_of_tools_shows_them", lambda: a_report_of_tools_shows_them(browser, "liver-coarse")))
     try:

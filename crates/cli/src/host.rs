@@ -3,10 +3,12 @@
 //! What is measured here is what a C or C# program gets. One row of `cargo xtask study report` reaches behind the ABI, since no host can ask
 //! for it: a bundle's linear response alone (`report/prior_alone.rs`).
 
+mod cuts;
 mod hand;
 mod instrument;
 mod scene;
 
+pub use cuts::SurfaceNews;
 pub use hand::Hand;
 pub use instrument::{Hull, instrument};
 pub use scene::Scene;

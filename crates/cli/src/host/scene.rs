@@ -8,7 +8,7 @@ use crate::effort::Effort;
 
 /// A scene; destroyed when dropped. Used by the thread that made it.
 pub struct Scene {
-    handle: *mut ffi::upt_scene,
+    pub(super) handle: *mut ffi::upt_scene,
 }
 
 impl Scene {

@@ -106,6 +106,9 @@ pub fn between(from: Option<Tool>, to: Option<Tool>, part: f32) -> Option<Tool> 
     let (Some(from), Some(mut at)) = (from, to) else {
         return to;
     };
+    if from.kind != at.kind {
+        return to;
+    }
     let far = |k: usize| (at.position[k] - from.position[k]).abs() > PUT_MM;
     if part >= 1.0 || (0..3).any(far) {
         return to;
@@ -126,6 +129,7 @@ pub fn between(from: Option<Tool>, to: Option<Tool>, part: f32) -> Option<Tool> 
 
 #[cfg(test)]
 mod tests {
+    use super::super::protocol::Kind;
     use super::*;
 
     fn tool(x: f32) -> Option<Tool> {
@@ -136,6 +140,7 @@ mod tests {
             half_length: 20.0,
             friction: 0.3,
             grasp: false,
+            kind: Kind::Press,
         })
     }
 

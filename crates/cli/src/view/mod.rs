@@ -9,6 +9,7 @@ mod http;
 mod protocol;
 mod server;
 mod session;
+mod surgery;
 
 use std::net::TcpListener;
 use std::path::PathBuf;

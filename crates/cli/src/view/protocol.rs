@@ -3,11 +3,12 @@
 //! From the page, JSON text of at most 1,024 bytes:
 //!
 //! ```json
-//! {"tool": {"position": [0,0,0], "rotation": [0,0,0,1], "radius": 5, "half_length": 20, "friction": 0.3, "grasp": false}, "sequence": 7}
+//! {"tool": {"position": [0,0,0], "rotation": [0,0,0,1], "radius": 5, "half_length": 20, "friction": 0.3, "grasp": false, "kind": "press"}, "sequence": 7}
 //! {"tool": null, "sequence": 8}      no tool
 //! {"reset": true}                    back to rest
 //! {"record": true}                   start a recording (false: end it)
 //! {"replay": true}                   from rest through the recording
+//! {"undo": true}                     the body before the last stroke of a blade, aspirator or coagulator
 //! ```
 //!
 //! A message about the tool asks for a frame: the page sends one for each picture that it draws, so that nothing piles up where it is
@@ -16,6 +17,11 @@
 //! To the page: first JSON text (`Hello`), then a binary message of the surface, rest positions `[n,3]` f32, faces `[m,3]`
 //! u32 and 1 for each node of the domain `[n]` u32, then a binary message a frame: [`HEADER`] numbers of 32 bits, little-endian, then displacements
 //! `[n,3]` f32, mm.
+//!
+//! Where a blade, an aspirator or a coagulator has changed the body, text (`SurfaceHeader`) and a binary message come before the first frame of its new surface: rest
+//! positions of the new vertices `[vertices - first_vertex, 3]` f32, 1 for each of them that is of the domain, the slots of triangles that have changed `[changed]`,
+//! their corners `[changed, 3]` (0, 0, 0: none), 1 for each of them that was inside of the intact body, and the hardened vertices `[hardened]`, all u32. From then on a
+//! frame has a displacement for each vertex. What the library refuses to do is told as text, `{"refused": "..."}`.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,8 +30,9 @@ pub const LONGEST_MESSAGE: usize = 1024;
 /// Numbers before the displacements of a frame: sequence, flags, contacts, state (u32: 1 recording, 2 replaying, 4 asleep),
 /// step ms, indicator, force x y z (mN), largest displacement (mm), ms that the frame took to make, steps (u32),
 /// corrections (u32), their estimated error (mm), deepest tissue inside of the tool (mm), then where the tool is in this frame: 1 or 0
-/// (u32), position x y z, rotation x y z w, radius.
-pub const HEADER: usize = 24;
+/// (u32), position x y z, rotation x y z w, radius, and what it is (u32: 0 presses, 1 blade, 2 aspirator, 3 coagulator); area cut (mm²), volume removed (mm³),
+/// copies of nodes (u32), strokes that can be undone (u32), ms that the last change of the body took. The force on a blade is in place of the pressing tool's.
+pub const HEADER: usize = 30;
 /// No organ and no tool is larger, mm.
 const FARTHEST: f32 = 10_000.0;
 /// No tool rubs more.
@@ -45,6 +52,20 @@ pub struct Tool {
     /// It holds what it touches.
     #[serde(default)]
     pub grasp: bool,
+    #[serde(default)]
+    pub kind: Kind,
+}
+
+/// What a tool does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// It presses, or holds.
+    #[default]
+    Press = 0,
+    Blade = 1,
+    Aspirator = 2,
+    Coagulator = 3,
 }
 
 /// One wish of the page.
@@ -54,6 +75,7 @@ pub enum Wish {
     Reset,
     Record(bool),
     Replay,
+    Undo,
 }
 
 #[derive(Deserialize)]
@@ -65,6 +87,7 @@ struct Message {
     reset: Option<bool>,
     record: Option<bool>,
     replay: Option<bool>,
+    undo: Option<bool>,
 }
 
 /// Tells `"tool": null` from no tool at all.
@@ -83,6 +106,7 @@ impl Wish {
             message.reset.filter(|yes| *yes).map(|_| Wish::Reset),
             message.record.map(Wish::Record),
             message.replay.filter(|yes| *yes).map(|_| Wish::Replay),
+            message.undo.filter(|yes| *yes).map(|_| Wish::Undo),
         ];
         let mut given = given.into_iter().flatten();
         match (given.next(), given.next()) {
@@ -91,7 +115,7 @@ impl Wish {
                 Ok(Wish::Tool(Some(tool), sequence))
             }
             (Some(wish), None) => Ok(wish),
-            _ => Err("a message must hold one of tool, reset, record, replay".into()),
+            _ => Err("a message must hold one of tool, reset, record, replay, undo".into()),
         }
     }
 }
@@ -133,8 +157,21 @@ pub struct Hello {
     /// Seconds.
     pub dt: f32,
     pub max_push_mm: f32,
-    /// Whether frames show the tissue of their own moment; otherwise they run one step behind.
+    /// Whether frames show the tissue of their own moment; otherwise they run one step behind, and the body cannot be cut.
     pub presents: bool,
+}
+
+/// Before the numbers of a surface that has changed.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct SurfaceHeader {
+    pub vertices: usize,
+    /// Of triangles, empty ones included.
+    pub slots: usize,
+    pub first_vertex: usize,
+    pub changed: usize,
+    pub hardened: usize,
+    /// Vertices and slots before are forgotten.
+    pub is_new: bool,
 }
 
 #[cfg(test)]
@@ -153,6 +190,12 @@ mod tests {
             Ok(Wish::Tool(None, 8))
         );
         assert_eq!(Wish::parse(r#"{"reset":true}"#), Ok(Wish::Reset));
+        assert_eq!(Wish::parse(r#"{"undo":true}"#), Ok(Wish::Undo));
+        let blade = tool.replace(r#""friction":0.3"#, r#""friction":0.3,"kind":"blade""#);
+        let Ok(Wish::Tool(Some(read), _)) = Wish::parse(&blade) else {
+            panic!()
+        };
+        assert_eq!(read.kind, Kind::Blade);
         assert_eq!(Wish::parse(r#"{"record":false}"#), Ok(Wish::Record(false)));
     }
 
@@ -193,6 +236,7 @@ mod tests {
             with("friction", "NaN"),
             with("friction", "null"),
             with("colour", "1"),
+            with("kind", "\"saw\""),
         ]);
         for text in bad {
             assert!(Wish::parse(&text).is_err(), "{text}");

@@ -35,7 +35,7 @@ const UNREAD: Duration = Duration::from_secs(5);
 const SPENT: f64 = 0.3;
 
 /// What the page is made of.
-const FILES: [(&str, &str, &[u8]); 9] = [
+const FILES: [(&str, &str, &[u8]); 11] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -60,6 +60,16 @@ const FILES: [(&str, &str, &[u8]); 9] = [
         "/hand.js",
         "text/javascript",
         include_bytes!("page/hand.js"),
+    ),
+    (
+        "/organ.js",
+        "text/javascript",
+        include_bytes!("page/organ.js"),
+    ),
+    (
+        "/instruments.js",
+        "text/javascript",
+        include_bytes!("page/instruments.js"),
     ),
     (
         "/plot.js",
@@ -311,12 +321,18 @@ impl Server {
                 continue;
             }
             sent = Instant::now();
-            let frame = session.frame()?.to_vec();
+            // What the step of this frame does to the body is told before the next.
+            let mut messages = session.told()?;
+            messages.push(Message::binary(session.frame()?.to_vec()));
             steps = true;
-            match socket.send(Message::binary(frame)) {
-                Ok(()) => {}
-                Err(Error::ConnectionClosed | Error::AlreadyClosed | Error::Io(_)) => return Ok(()),
-                Err(error) => return Err(error.into()),
+            for message in messages {
+                match socket.send(message) {
+                    Ok(()) => {}
+                    Err(Error::ConnectionClosed | Error::AlreadyClosed | Error::Io(_)) => {
+                        return Ok(());
+                    }
+                    Err(error) => return Err(error.into()),
+                }
             }
         }
     }

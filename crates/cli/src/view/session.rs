@@ -7,10 +7,12 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use anyhow::Result;
+use tungstenite::Message;
 use upt::ffi;
 
 use super::clock::{Clock, between};
-use super::protocol::{HEADER, Hello, Tool, Wish};
+use super::protocol::{HEADER, Hello, Kind, SurfaceHeader, Tool, Wish};
+use super::surgery::Surgery;
 use crate::host::{Model, Scene, instrument};
 
 /// From this friction on, nodes that are moved by the tool stick to it.
@@ -51,6 +53,9 @@ pub struct Session {
     count: usize,
     penetration_mm: f32,
     frame_ms: f32,
+    /// What changes the body, and what the page is to be told of it.
+    surgery: Surgery,
+    news: Vec<(SurfaceHeader, Vec<u8>)>,
     displacement: Vec<[f32; 3]>,
     force: [f32; 3],
     bytes: Vec<u8>,
@@ -99,6 +104,8 @@ impl Session {
             count: 0,
             penetration_mm: 0.0,
             frame_ms: 0.0,
+            surgery: Surgery::new(model)?,
+            news: Vec::new(),
             force: [0.0; 3],
             bytes: Vec::new(),
         })
@@ -144,6 +151,14 @@ impl Session {
                 self.recording = None;
                 self.replayed = Some(0);
             }
+            Wish::Undo => {
+                self.scene.settle();
+                if self.clock.in_flight() {
+                    self.clock.finished();
+                }
+                self.surgery.undo(&mut self.scene)?;
+                self.look()?;
+            }
         }
         Ok(())
     }
@@ -161,7 +176,29 @@ impl Session {
         self.contacts = 0;
         self.penetration_mm = 0.0;
         self.force = [0.0; 3];
-        self.scene.reset()
+        self.surgery.reset();
+        self.scene.reset()?;
+        self.look()
+    }
+
+    /// Keeps what is new of the surface. No step is in flight.
+    fn look(&mut self) -> Result<()> {
+        self.news.extend(self.surgery.news(&mut self.scene)?);
+        Ok(())
+    }
+
+    /// What the page is to be told before the next frame.
+    pub fn told(&mut self) -> Result<Vec<Message>> {
+        let mut messages = Vec::new();
+        for (header, bytes) in self.news.drain(..) {
+            let text = serde_json::to_string(&serde_json::json!({ "surface": header }))?;
+            messages.extend([Message::text(text), Message::binary(bytes)]);
+        }
+        if let Some(why) = self.surgery.refused.take() {
+            let text = serde_json::json!({ "refused": why }).to_string();
+            messages.push(Message::text(text));
+        }
+        Ok(messages)
     }
 
     /// Takes the step that has finished, writes the frame of this moment, and submits the step that is due.
@@ -179,8 +216,13 @@ impl Session {
         };
         self.clock.moved(now, self.shown);
         let since = self.clock.since(now);
-        if self.presents {
-            let instruments: Vec<ffi::upt_instrument> = self.shown.iter().map(capsule).collect();
+        if self.surgery.begun {
+            self.displacement.resize(self.surgery.vertices(), [0.0; 3]);
+            let instruments = pressing(self.shown.as_ref());
+            self.scene
+                .present_surface(since, &instruments, &mut self.displacement)?;
+        } else if self.presents {
+            let instruments = pressing(self.shown.as_ref());
             self.scene
                 .present(since, &instruments, &mut self.displacement)?;
         } else {
@@ -215,7 +257,7 @@ impl Session {
     }
 
     fn step(&mut self, now: f64) -> Result<()> {
-        let instruments = self.begin(now);
+        let instruments = self.begin(now)?;
         if self.solves {
             return self.scene.submit_instruments(&instruments);
         }
@@ -225,7 +267,7 @@ impl Session {
     }
 
     /// The instruments of the step that begins.
-    fn begin(&mut self, now: f64) -> Vec<ffi::upt_instrument> {
+    fn begin(&mut self, now: f64) -> Result<Vec<ffi::upt_instrument>> {
         let mut tool = self.clock.begin(now);
         if let Some(next) = &mut self.replayed {
             // The very poses of the recording: its steps again, to the bit where all corrections are made.
@@ -240,9 +282,13 @@ impl Session {
         {
             recording.push(tool);
         }
-        let instruments: Vec<ffi::upt_instrument> = tool.iter().map(capsule).collect();
+        if self.presents {
+            self.surgery.operate(&mut self.scene, tool, self.dt)?;
+            self.look()?;
+        }
+        let instruments = pressing(tool.as_ref());
         self.count = instruments.len();
-        instruments
+        Ok(instruments)
     }
 
     /// What the finished step says about its tool.
@@ -282,6 +328,11 @@ impl Session {
             .map_or(([0.0; 3], [0.0, 0.0, 0.0, 1.0], 0.0f32), |tool| {
                 (tool.position, tool.rotation, tool.radius)
             });
+        let force = match self.shown {
+            Some(tool) if tool.kind != Kind::Press => self.surgery.force,
+            _ => self.force,
+        };
+        let account = self.surgery.account;
         let header: [[u8; 4]; HEADER] = [
             self.sequence.to_le_bytes(),
             stats.flags.to_le_bytes(),
@@ -289,9 +340,9 @@ impl Session {
             state.to_le_bytes(),
             (stats.step_ms as f32).to_le_bytes(),
             stats.indicator.to_le_bytes(),
-            self.force[0].to_le_bytes(),
-            self.force[1].to_le_bytes(),
-            self.force[2].to_le_bytes(),
+            force[0].to_le_bytes(),
+            force[1].to_le_bytes(),
+            force[2].to_le_bytes(),
             stats.max_displacement_mm.to_le_bytes(),
             self.frame_ms.to_le_bytes(),
             (stats.step_count as u32).to_le_bytes(),
@@ -307,6 +358,12 @@ impl Session {
             turn[2].to_le_bytes(),
             turn[3].to_le_bytes(),
             radius.to_le_bytes(),
+            (self.shown.map_or(0, |tool| tool.kind as u32)).to_le_bytes(),
+            account.area_mm2.to_le_bytes(),
+            account.removed_mm3.to_le_bytes(),
+            account.copies.to_le_bytes(),
+            (self.surgery.undo_count() as u32).to_le_bytes(),
+            self.surgery.change_ms.to_le_bytes(),
         ];
         self.bytes.clear();
         self.bytes.extend(header.as_flattened());
@@ -315,6 +372,12 @@ impl Session {
         }
         Ok(&self.bytes)
     }
+}
+
+/// The instruments of a tool: none where it does something else than press.
+fn pressing(tool: Option<&Tool>) -> Vec<ffi::upt_instrument> {
+    let presses = tool.filter(|tool| tool.kind == Kind::Press);
+    presses.into_iter().map(capsule).collect()
 }
 
 fn capsule(tool: &Tool) -> ffi::upt_instrument {

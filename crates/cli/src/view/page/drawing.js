@@ -55,9 +55,22 @@ export function tissueMaterial() {
   return new three.MeshStandardMaterial({ vertexColors: true, roughness: 0.55 });
 }
 
+// Of what lay inside of the intact organ: moist.
+export function insideMaterial() {
+  if (software) return atCorners(true, 0xffffff, 0.25);
+  return new three.MeshStandardMaterial({ vertexColors: true, roughness: 0.25 });
+}
+
 export function steelMaterial() {
   if (software) return atCorners(false, 0x7d95ab, 0.5);
   return new three.MeshStandardMaterial({ color: 0x9fb4c8, metalness: 0.6, roughness: 0.35 });
+}
+
+// How far a tool reaches.
+export function reachMaterial() {
+  const material = software ? atCorners(false, 0xf2b84b, 0) : new three.MeshStandardMaterial({ color: 0xf2b84b });
+  material.wireframe = true;
+  return material;
 }
 
 // Normals of the corners: the sum of their faces' normals, each as long as its face is large.
@@ -66,8 +79,9 @@ export function turnNormals(geometry) {
   const p = position.array;
   const n = normal.array;
   const faces = geometry.index.array;
+  const last = Math.min(faces.length, geometry.drawRange.count);
   n.fill(0);
-  for (let f = 0; f < faces.length; f += 3) {
+  for (let f = 0; f < last; f += 3) {
     const a = 3 * faces[f];
     const b = 3 * faces[f + 1];
     const c = 3 * faces[f + 2];

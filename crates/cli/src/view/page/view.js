@@ -2,13 +2,15 @@
 // What the two say to each other: protocol.rs. Each picture has one frame, asked for as late as it can be, so that it shows where the
 // mouse and the tissue are now.
 import * as three from "./three.js";
-import { makeRenderer, software, steelMaterial, tissueMaterial, turnNormals, whenDrawn } from "./drawing.js";
+import { makeRenderer, software, whenDrawn } from "./drawing.js";
 import { connect } from "./connection.js";
 import { gltf } from "./gltf.js";
 import { HALF_LENGTH, Hand } from "./hand.js";
+import { KINDS, ShownTool, radiusOf } from "./instruments.js";
+import { Organ } from "./organ.js";
 import { ForcePlot } from "./plot.js";
 
-const HEADER = 24;
+const HEADER = 30;
 const READOUTS = 250; // ms between two of the readouts
 const AHEAD = 2; // frames that are asked for and have not come
 const OFTEN = 0.998; // of the frames come in time for their picture
@@ -33,9 +35,7 @@ const FLAGS = [
   "tool deep in the tissue",
   "contact not solved",
 ];
-const PALE = new three.Color(0xd8bfb0);
-const GREY = new three.Color(0x8f9399); // where the model was not trained to be touched
-const RED = new three.Color(0xc8402a);
+const REFUSED = 4000; // ms for which a refusal is shown
 
 const at = (id) => document.getElementById(id);
 const show = (id, text) => {
@@ -52,11 +52,9 @@ const light = new three.DirectionalLight(0xffffff, 2.2);
 scene.add(new three.AmbientLight(0xffffff, 0.9), light, camera);
 
 let hello; // the server's first message
-let surface; // as it is shown
-let rest; // at rest and not shown: where the mouse finds its place
-let restPositions;
-let restColours;
-let tool; // the capsule that is shown
+let organ; // what is shown
+let kind = "press"; // what the mouse holds
+const tool = new ShownTool(scene);
 let pointer; // {x, y, last} while the tool is held: where the mouse is, since when
 let moves = []; // when it moved since a frame was asked for
 let hand; // while the tool is held
@@ -72,7 +70,7 @@ let before = 0; // when the last picture was begun
 let timer; // asks for the next frame
 let sent = []; // {sequence, due, moves} of the frames that are asked for, until they are seen
 const pictures = []; // when the last ones were shown
-const status = { drawn: 0, shown: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], stepTimes: [], forces: [], steps: 0, sequence: 0, software };
+const status = { drawn: 0, shown: 0, surfaces: 0, largest: 0, force: 0, contacts: 0, latency: [], made: [], intervals: [], stepTimes: [], forces: [], steps: 0, sequence: 0, software };
 window.uptView = status; // for tests
 
 const say = connect({
@@ -83,6 +81,14 @@ const say = connect({
     at("depth").max = hello.max_push_mm;
   },
   geometry: build,
+  surface: (changed, data) => {
+    organ.take(changed, data);
+    status.surfaces += 1;
+  },
+  refused: (why) => {
+    show("message", why);
+    setTimeout(() => show("message", ""), REFUSED);
+  },
   frame: (data) => {
     latest = data;
     const [came] = new Uint32Array(data, 0, 1);
@@ -95,35 +101,14 @@ const say = connect({
 
 function build(data) {
   const { surface_node_count: nodes, surface_face_count: faces } = hello;
-  restPositions = new Float32Array(data, 0, 3 * nodes);
-  const indices = new three.BufferAttribute(new Uint32Array(data, 12 * nodes, 3 * faces), 1);
-  const geometry = (positions) => {
-    const made = new three.BufferGeometry();
-    made.setAttribute("position", new three.BufferAttribute(positions, 3));
-    made.setIndex(indices);
-    made.computeVertexNormals();
-    made.computeBoundingSphere();
-    return made;
-  };
-  const moving = geometry(restPositions.slice());
+  const rest = new Float32Array(data, 0, 3 * nodes);
   const domain = new Uint32Array(data, 12 * (nodes + faces), nodes);
-  restColours = new Float32Array(3 * nodes);
-  const middle = new three.Vector3();
-  for (let i = 0; i < nodes; i += 1) {
-    (domain[i] ? PALE : GREY).toArray(restColours, 3 * i);
-    if (domain[i]) middle.add(new three.Vector3().fromArray(restPositions, 3 * i));
-  }
-  middle.divideScalar(domain.reduce((sum, x) => sum + x, 0));
-  moving.setAttribute("color", new three.BufferAttribute(restColours.slice(), 3));
-  surface = new three.Mesh(moving, tissueMaterial());
-  surface.frustumCulled = false;
-  rest = new three.Mesh(geometry(restPositions), surface.material);
-  tool = new three.Mesh(new three.CapsuleGeometry(1, 1), steelMaterial());
-  tool.visible = false;
-  scene.add(surface, tool);
-  const { center, radius } = rest.geometry.boundingSphere;
+  organ = new Organ(rest, new Uint32Array(data, 12 * nodes, 3 * faces), domain);
+  scene.add(...organ.shown);
+  at("tools").hidden = !hello.presents;
+  const { center, radius } = organ.picked.geometry.boundingSphere;
   controls.target.copy(center);
-  camera.position.copy(middle).sub(center).setLength(3.2 * radius).add(center); // the domain in front
+  camera.position.copy(Organ.middle(rest, domain)).sub(center).setLength(3.2 * radius).add(center); // the domain in front
   controls.update();
 }
 
@@ -131,26 +116,8 @@ function build(data) {
 function take(data) {
   const words = new Uint32Array(data, 0, HEADER);
   const numbers = new Float32Array(data, 0, HEADER);
-  const displacement = new Float32Array(data, 4 * HEADER);
-  const { position, color } = surface.geometry.attributes;
-  const positions = position.array;
-  const colours = color.array;
-  const most = 0.8 * hello.max_push_mm;
-  for (let i = 0; i < displacement.length; i += 3) {
-    const x = displacement[i];
-    const y = displacement[i + 1];
-    const z = displacement[i + 2];
-    positions[i] = restPositions[i] + x;
-    positions[i + 1] = restPositions[i + 1] + y;
-    positions[i + 2] = restPositions[i + 2] + z;
-    const share = Math.min(Math.sqrt(x * x + y * y + z * z) / most, 1);
-    colours[i] = restColours[i] + share * (RED.r - restColours[i]);
-    colours[i + 1] = restColours[i + 1] + share * (RED.g - restColours[i + 1]);
-    colours[i + 2] = restColours[i + 2] + share * (RED.b - restColours[i + 2]);
-  }
-  turnNormals(surface.geometry);
-  position.needsUpdate = true;
-  color.needsUpdate = true;
+  // One of the surface before is skipped.
+  if (!organ.move(new Float32Array(data, 4 * HEADER), 0.8 * hello.max_push_mm)) return;
   status.sequence = words[0];
   status.flags = words[1];
   status.contacts = words[2];
@@ -165,20 +132,14 @@ function take(data) {
   status.corrections = words[12];
   status.errorMm = numbers[13];
   status.penetration = numbers[14];
-  placeTool(words[15] !== 0, numbers.subarray(16));
-}
-
-// The tool as it is in the frame: dragged, or replayed.
-function placeTool(there, [x, y, z, qx, qy, qz, qw, radius]) {
-  tool.visible = there;
-  if (!there) return;
-  if (tool.userData.radius !== radius) {
-    tool.geometry.dispose();
-    tool.geometry = new three.CapsuleGeometry(radius, 2 * HALF_LENGTH, 8, 24);
-    tool.userData.radius = radius;
-  }
-  tool.position.set(x, y, z);
-  tool.quaternion.set(qx, qy, qz, qw);
+  status.kind = KINDS[words[24]];
+  status.area = numbers[25];
+  status.removed = numbers[26];
+  status.copies = words[27];
+  status.undos = words[28];
+  status.changeMs = numbers[29];
+  if (words[15] === 0) tool.hide();
+  else tool.place(words[24], numbers.subarray(16));
 }
 
 function readOut() {
@@ -190,6 +151,12 @@ function readOut() {
   show("largest", `${status.largest.toFixed(1)} mm`);
   show("contacts", String(status.contacts));
   show("record", status.recording ? "Stop" : "Record");
+  if (kind !== "press" || status.undos > 0) at("wound").hidden = false;
+  at("undo").disabled = status.undos === 0;
+  show("area", `${(status.area / 100).toFixed(2)} cm²`);
+  show("removed", `${(status.removed / 1000).toFixed(2)} cm³`);
+  show("copies", String(status.copies));
+  show("change", `${status.changeMs.toFixed(1)} ms`);
   const raised = FLAGS.filter((_, bit) => (status.flags & (1 << bit)) !== 0);
   show("flags", raised.join(", "));
   if (status.rate) show("rate", `${status.rate.toFixed(0)} /s`);
@@ -227,14 +194,14 @@ function ask() {
     return;
   }
   const now = performance.now();
-  const grasp = at("grasp").checked && hand.pressed(now);
+  const grasp = kind === "press" && at("grasp").checked && hand.pressed(now);
   if (moved.length > 0) {
     const found = grasp ? pulled(pointer) : place(pointer);
     if (found) hand.aim(found);
   }
-  const radius = Number(at("radius").value);
-  const tool = { ...hand.pose(now, { depth: Number(at("depth").value), radius }), radius, half_length: HALF_LENGTH, friction: Number(at("friction").value), grasp };
-  say({ tool, sequence });
+  const radius = radiusOf(kind, Number(at("radius").value));
+  const pose = hand.pose(now, { depth: Number(at("depth").value), radius });
+  say({ tool: { ...pose, radius, half_length: HALF_LENGTH, friction: Number(at("friction").value), grasp, kind }, sequence });
 }
 
 const ray = new three.Raycaster();
@@ -248,10 +215,10 @@ function look({ x: left, y: top }) {
 // Where the mouse points, of the tissue at rest.
 function place(where) {
   look(where);
-  const [hit] = rest ? ray.intersectObject(rest) : [];
+  const [hit] = organ ? ray.intersectObject(organ.picked) : [];
   if (!hit) return null;
   // The mean normal of the face's corners: smoother than the face's own while sliding.
-  const normals = rest.geometry.attributes.normal;
+  const normals = organ.picked.geometry.attributes.normal;
   const normal = new three.Vector3();
   for (const corner of [hit.face.a, hit.face.b, hit.face.c]) normal.add(new three.Vector3().fromBufferAttribute(normals, corner));
   return { point: hit.point, normal: normal.normalize() };
@@ -303,11 +270,22 @@ for (const [id, unit] of [["depth", " mm"], ["radius", " mm"], ["friction", ""]]
   label();
 }
 at("reset").addEventListener("click", () => say({ reset: true }));
+at("undo").addEventListener("click", () => say({ undo: true }));
+addEventListener("keydown", (event) => {
+  if ((event.ctrlKey || event.metaKey) && event.key === "z") at("undo").click();
+});
+const choices = at("tools").querySelectorAll("[data-kind]");
+for (const button of choices) {
+  button.addEventListener("click", () => {
+    kind = button.dataset.kind;
+    for (const other of choices) other.setAttribute("aria-pressed", String(other === button));
+  });
+}
 at("record").addEventListener("click", () => say({ record: !status.recording }));
 at("replay").addEventListener("click", () => say({ replay: true }));
 status.nodes = () => hello.node_count;
 status.dt = () => 1000 * hello.dt;
-status.gltf = () => gltf(surface.geometry, hello.bundle);
+status.gltf = () => gltf(organ.whole, hello.bundle);
 at("save").addEventListener("click", () => {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([status.gltf()], { type: "model/gltf+json" }));
@@ -347,7 +325,7 @@ renderer.setAnimationLoop((now) => {
   if (size.x !== width || size.y !== height) renderer.setSize(width, height, false);
   if (size.x !== width || size.y !== height || at("panel").clientHeight !== panelHeight) lookBesidePanel(width, height);
   panelHeight = at("panel").clientHeight;
-  if (!surface) return;
+  if (!organ) return;
   status.drawn += 1;
   const data = latest;
   latest = undefined;
