@@ -14,7 +14,7 @@ export ORT_DYLIB_PATH=${ORT_DYLIB_PATH:-$root/target/ort/libonnxruntime.so}
 here=$root/examples/godot
 
 bundle=
-for name in "${UPT_BUNDLE:-}" "$bundles/brain-reduced" "$bundles/brain-fast" "$bundles/brain-coarse"; do
+for name in "${UPT_BUNDLE:-}" "$bundles/brain" "$bundles/brain-fast" "$bundles/brain-coarse"; do
   if [ -n "$name" ] && [ -f "$name/bundle.json" ]; then bundle=$name; break; fi
 done
 [ -n "$bundle" ] || { echo "no bundle in $bundles" >&2; exit 1; }

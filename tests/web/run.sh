@@ -26,7 +26,7 @@ press() {
 }
 press onnx/liver-coarse 3
 press onnx/liver-coarse 0
-press onnx/brain-supported 3
+press onnx/brain 3
 
 # add COMMAND...: runs it and adds up its last line.
 add() {

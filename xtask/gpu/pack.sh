@@ -75,7 +75,7 @@ else
   if [ -n "$small" ]; then
     cp -r "$root"/onnx/brain-coarse "$root"/onnx/brain-coarse-reduced "$stage/upt/bundles/"
   else
-    cp -r "$root"/onnx/brain-fast "$root"/onnx/brain-reduced "$stage/upt/bundles/"
+    cp -r "$root"/onnx/brain "$root"/onnx/brain-fast "$root"/onnx/brain-reduced "$stage/upt/bundles/"
   fi
   if [ -n "$small" ]; then brain=$root/onnx/meshes/brain-coarse.mesh.safetensors; fi
   if [ "$#" -eq 0 ]; then

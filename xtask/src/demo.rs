@@ -30,7 +30,7 @@ const ORGANS: [Organ; 2] = [
     Organ {
         name: "brain",
         mesh: "onnx/meshes/brain.mesh.safetensors",
-        bundle: "onnx/brain-reduced",
+        bundle: "onnx/brain",
         plain: "zero,prior,coarse,tled",
     },
     Organ {

@@ -62,7 +62,7 @@ enum Task {
     #[command(after_help = "Examples:\n  cargo xtask view\n  cargo xtask view onnx/brain-fast")]
     View {
         /// The bundle's folder.
-        #[arg(default_value = "onnx/brain-reduced")]
+        #[arg(default_value = "onnx/brain")]
         bundle: std::path::PathBuf,
     },
     /// Make the archive for C and C++ hosts, the Unity package, the wheel or the npm package.

@@ -234,8 +234,8 @@ fn unity(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
         }
     }
     // Unity leaves folders whose names end in ~ alone, so these need no .meta files.
-    for (name, place) in Workspace::bundle_files(&workspace.path("onnx/brain-reduced"))? {
-        copy(&place, &root.join("Bundles~/brain-reduced").join(name))?;
+    for (name, place) in Workspace::bundle_files(&workspace.path("onnx/brain"))? {
+        copy(&place, &root.join("Bundles~/brain").join(name))?;
     }
     let notice = root.join("Documentation~/third-party-crates.txt");
     script(workspace, LICENCES, &notice)?;

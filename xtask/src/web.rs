@@ -43,7 +43,7 @@ const ORGANS: [Organ; 3] = [
     Organ {
         name: "brain-fine",
         title: "brain, fine (20 MB)",
-        bundle: "onnx/brain-supported",
+        bundle: "onnx/brain",
         mesh: None,
     },
 ];

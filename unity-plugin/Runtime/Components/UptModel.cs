@@ -13,7 +13,7 @@ namespace Upt
     public sealed class UptModel : ScriptableObject
     {
         [Tooltip("Bundle folder: absolute, or relative to StreamingAssets.")]
-        public string bundlePath = "brain-reduced";
+        public string bundlePath = "brain";
 
         [Tooltip("Threads of a step. 0: the library's default.")]
         public int threads = 0;
@@ -41,7 +41,7 @@ namespace Upt
                 string path = ResolvedPath;
                 if (!Directory.Exists(path))
                     throw new DirectoryNotFoundException(
-                        "libupt bundle '" + path + "' does not exist: copy a bundle folder (onnx/brain-reduced) into " +
+                        "libupt bundle '" + path + "' does not exist: copy a bundle folder (onnx/brain) into " +
                         "StreamingAssets, or set an absolute path on the UptModel asset '" + name + "'");
                 model = new Model(path, (uint)Math.Max(0, threads));
             }

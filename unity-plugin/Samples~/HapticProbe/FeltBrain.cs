@@ -6,11 +6,11 @@ namespace Upt.Samples
     /// <summary>
     /// The whole sample: put this on an empty object in an empty scene and press play. It builds the brain and, in front of the middle of its
     /// trained domain, a ball with a <see cref="HapticTool"/> and a <see cref="HapticProbe"/>: a simulated hand that presses it in and
-    /// lifts it. Without a model asset it takes the bundle brain-reduced in StreamingAssets.
+    /// lifts it. Without a model asset it takes the bundle brain in StreamingAssets.
     /// </summary>
     public sealed class FeltBrain : MonoBehaviour
     {
-        [Tooltip("The model asset. None: the bundle brain-reduced in StreamingAssets.")]
+        [Tooltip("The model asset. None: the bundle brain in StreamingAssets.")]
         public UptModel model;
 
         [Tooltip("Radius of the ball, mm.")]

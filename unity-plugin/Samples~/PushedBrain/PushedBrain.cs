@@ -11,7 +11,7 @@ namespace Upt.Samples
     /// </summary>
     public sealed class PushedBrain : MonoBehaviour
     {
-        [Tooltip("The model asset (bundle brain-reduced or brain-fast).")]
+        [Tooltip("The model asset (bundle brain, brain-reduced or brain-fast).")]
         public UptModel model;
 
         [Tooltip("Deepest push, mm.")]
