@@ -12,6 +12,7 @@ mod reaction;
 mod release;
 mod response;
 mod space;
+mod stepped;
 mod table;
 mod vibration;
 

@@ -58,3 +58,20 @@ impl Numbers {
         }
     }
 }
+
+/// What a file leaves out is memory all the same: a small file asks for no more than so many times its size.
+const MOST_ZEROS: usize = 64;
+
+/// The numbers of a whole table, where a file that holds `stored` of its bytes or numbers may ask for so many; `leaves` says what it leaves out.
+pub(super) fn fits(
+    file: &TensorFile,
+    leaves: &str,
+    size: Option<usize>,
+    stored: usize,
+) -> Result<usize> {
+    let most = MOST_ZEROS.saturating_mul(stored);
+    size.filter(|size| *size <= most).ok_or_else(|| {
+        let problem = format!("leave less than one in {MOST_ZEROS} of the table");
+        file.bad(leaves, problem)
+    })
+}

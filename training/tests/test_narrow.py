@@ -15,6 +15,8 @@ from upt_training.mesh_file import load_mesh
 from upt_training.reduced.narrow import narrow
 from upt_training.reduced.ragged import ragged_tensors, whole_response
 from upt_training.reduced.runner import ReducedRunner
+from upt_training.reduced.step_tables import step
+from upt_training.reduced.stepped import in_numbers, packed, quarters, unpacked, widths_of
 
 FIXTURES = Path(__file__).parents[2] / "tests/fixtures"
 BUNDLES = [FIXTURES / "tiny-corrected", FIXTURES / "tiny-upt-prior"]
@@ -58,6 +60,33 @@ def test_what_a_node_does_not_reach_is_left_out():
     expected = response.copy()
     expected[:3, 8:16] = 0.0
     assert np.array_equal(whole_response(tensors), expected)
+
+
+def test_codes_of_every_width_come_back():
+    groups = [np.zeros(8, int), np.array([7, -7, 0, 1, -1, 2, 3, -3]), np.arange(-120, 120, 10), np.full(8, -32767)]
+    data, widths = packed(groups)
+    assert widths.tolist() == [0, 1, 2, 3] and len(data) == 4 + 24 + 16
+    assert np.array_equal(widths_of(quarters(np.append(widths, 3)), 5), [0, 1, 2, 3, 3])
+    for own, found in zip(groups, unpacked(data, widths, np.array([8, 8, 24, 8])), strict=True):
+        assert np.array_equal(own, found)
+    with pytest.raises(InputError, match="group 0 has a code of 32768"):
+        packed([np.full(8, 32768)])
+
+
+def test_tables_in_steps_give_the_same_rollouts_for_a_body_and_its_predictors(tmp_path):
+    narrow(BUNDLES, tmp_path / "narrow", tolerance_mm=1e-5, near_mm=1e3, drop=0.0, one_space=True)
+    bundles = [tmp_path / "narrow" / bundle.name for bundle in BUNDLES]
+    about = step(bundles, tmp_path / "out", response_step=1e-4, basis_mm=1e-4, mode_mm=1.0)
+    assert about["bytes"] < (bundles[0] / "prior.safetensors").stat().st_size
+    old, new = (
+        load_file(folder / BUNDLES[0].name / "prior.safetensors") for folder in (bundles[0].parent, tmp_path / "out")
+    )
+    numbers = in_numbers(new)
+    assert np.abs(numbers["response"] - whole_response(old).astype(float)).max() < 1e-4
+    for bundle, runner in zip(bundles, (ReducedRunner, BundleRunner), strict=True):
+        before, after = rollout(runner(bundle)), rollout(runner(tmp_path / "out" / bundle.name))
+        assert np.abs(after - before).max() < 5e-3 * np.abs(before).max()
+    assert not (tmp_path / "out" / BUNDLES[1].name / "prior.safetensors").exists()
 
 
 def test_bundles_of_another_body_are_refused(tmp_path):

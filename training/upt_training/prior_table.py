@@ -16,6 +16,7 @@ from upt_training.dataset import map_safetensors
 from upt_training.errors import InputError
 from upt_training.reduced.near import whole_compliance
 from upt_training.reduced.ragged import whole_response
+from upt_training.reduced.stepped import in_numbers
 
 DENSE_LIMIT = 1 << 30  # bytes of a dense table made by `restrict`
 
@@ -42,6 +43,7 @@ class PriorTable:
         ):
             if name not in tensors:
                 raise InputError(f"{path}: tensor {name!r} is missing; this is not a prior")
+        tensors = in_numbers(tensors)
         if len(tensors["block_nodes"]) != node_count:
             raise InputError(f"{path}: made for {len(tensors['block_nodes'])} nodes, the mesh has {node_count}")
         self.path, self.node_count = Path(path), node_count

@@ -11,7 +11,8 @@ use crate::error::Result;
 use crate::grid::{PointGrid, squared_distance};
 use crate::memory;
 use crate::prior::compliance::Compliance;
-use crate::prior::numbers::Numbers;
+use crate::prior::numbers::{Numbers, fits};
+use crate::prior::stepped;
 use crate::prior::vibration::FreeVibration;
 
 const WHAT: &str = "the linear response";
@@ -119,9 +120,17 @@ impl PriorTable {
         for &node in &mesh.domain_nodes {
             in_domain[node as usize] = true;
         }
-        let response = match file.has(RANKS) {
-            true => ragged(file, contact_nodes.len(), &rank_offsets)?,
-            false => Numbers::read(file, "response", &[Some(dofs), Some(width)])?,
+        let response = if stepped::is_stepped(file, "response") {
+            Numbers::of_f16(stepped::response(file, contact_nodes.len(), width)?)?
+        } else if file.has(RANKS) {
+            ragged(file, contact_nodes.len(), &rank_offsets)?
+        } else {
+            Numbers::read(file, "response", &[Some(dofs), Some(width)])?
+        };
+        let basis = if stepped::is_stepped(file, "basis") {
+            Numbers::of_f16(stepped::basis(file, &block_offsets, &rank_offsets, size)?)?
+        } else {
+            Numbers::read(file, "basis", &[Some(size)])?
         };
         let narrow = |values: Vec<usize>| {
             let narrow = values.iter().map(|&value| value as u32);
@@ -137,7 +146,7 @@ impl PriorTable {
             block_offsets: narrow(block_offsets)?,
             rank_offsets: narrow(rank_offsets)?,
             copies: None,
-            basis: Arc::new(Numbers::read(file, "basis", &[Some(size)])?),
+            basis: Arc::new(basis),
             response: Arc::new(response),
             residual: if modes > 0 {
                 learned.float("residual", &[Some(modes), Some(width)])?
@@ -154,9 +163,6 @@ impl PriorTable {
 
 /// How many coordinates of each block a contact node's rows hold, in eights.
 const RANKS: &str = "response_ranks";
-
-/// What a file leaves out is memory all the same: a small file asks for no more than so many times its size.
-const MOST_ZEROS: usize = 64;
 
 /// A response that holds of each block the leading coordinates alone, `[3D,Q]`: what a contact node does not reach is zero.
 fn ragged(file: &TensorFile, columns: usize, rank_offsets: &[usize]) -> Result<Numbers> {
@@ -176,14 +182,12 @@ fn ragged(file: &TensorFile, columns: usize, rank_offsets: &[usize]) -> Result<N
         count += 24 * usize::from(eights);
     }
     let stored = file.f16("response", &[Some(count)])?;
-    let size = (3 * columns).checked_mul(width);
-    let most = MOST_ZEROS * (kept.len() + count);
-    let Some(size) = size.filter(|size| *size <= most) else {
-        return Err(file.bad(
-            RANKS,
-            format!("leave less than one in {MOST_ZEROS} of the response"),
-        ));
-    };
+    let size = fits(
+        file,
+        RANKS,
+        (3 * columns).checked_mul(width),
+        kept.len() + count,
+    )?;
     let mut whole = memory::filled(size, f16::ZERO, WHAT)?;
     let mut from = stored.as_slice();
     for (row, to) in whole.chunks_exact_mut(width.max(1)).enumerate() {

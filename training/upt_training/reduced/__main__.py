@@ -25,6 +25,7 @@ from upt_training.reduced.make_prior import check_columns, make_prior, prior_err
 from upt_training.reduced.narrow import narrow_command
 from upt_training.reduced.prior import load_prior, save_prior
 from upt_training.reduced.response_error import response_error
+from upt_training.reduced.step_tables import step_command
 from upt_training.reduced.sweep import sweep
 from upt_training.reduced.train import Settings
 from upt_training.reduced.trajectories import open_dataset
@@ -125,6 +126,13 @@ def arguments() -> argparse.ArgumentParser:
     small.add_argument("--near-mm", type=float, default=20.0, help="pairs of contact nodes with exact compliance")
     small.add_argument("--drop", type=float, default=1e-3, help="of a block's response to 1 mN, what is left out, mm")
     small.add_argument("--one-space", action="store_true", help="corrections and whole modes of the first for all")
+
+    coded = commands.add_parser("step", help="the tables of a finished body in whole steps, for it and its predictors")
+    coded.add_argument("bundles", type=Path, nargs="+", help="bundle folders; the first is the body of the others")
+    coded.add_argument("--out", type=Path, required=True, help="folder for the new ones")
+    coded.add_argument("--response-step", type=float, default=2e-4, help="step of the response, mm/mN")
+    coded.add_argument("--basis-mm", type=float, default=5e-4, help="step of the basis where a coordinate is largest")
+    coded.add_argument("--mode-mm", type=float, default=2.0, help="how much of a mode counts beside pushes of 10 mm")
 
     domain = commands.add_parser("domain", help="a copy of a mesh with another domain; its hash stays")
     domain.add_argument("--mesh", type=Path, required=True)
@@ -238,6 +246,7 @@ def run_response_error(args: argparse.Namespace) -> None:
 
 COMMANDS = {
     "narrow": narrow_command,
+    "step": step_command,
     "prior": run_prior,
     "build": run_build,
     "modes": run_build,

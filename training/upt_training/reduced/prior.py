@@ -17,6 +17,7 @@ from upt_training.reduced.block_basis import BlockBasis
 from upt_training.reduced.columns import contact_forces, map_tensors, rows_of
 from upt_training.reduced.near import whole_compliance
 from upt_training.reduced.ragged import whole_response
+from upt_training.reduced.stepped import in_numbers
 
 
 @dataclass
@@ -113,6 +114,7 @@ def load_prior(path: Path | str, residual: Path | str | None = None) -> Prior:
     for name in names:
         if name not in tensors:
             raise InputError(f"{path}: tensor {name!r} is missing; build it with `python -m upt_training.reduced`")
+    tensors = in_numbers(tensors)
     block_offsets, rank_offsets = np.array(tensors["block_offsets"]), np.array(tensors["rank_offsets"])
     flat = np.array(tensors["basis"])
     bases, at = [], 0
