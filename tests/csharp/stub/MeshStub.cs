@@ -40,6 +40,29 @@ namespace UnityEngine
         }
         public void MarkDynamic() { }
         public void RecalculateNormals() { }
+        /// <summary>Triangles of each submesh.</summary>
+        private readonly System.Collections.Generic.List<int[]> parts = new System.Collections.Generic.List<int[]>();
+        public int subMeshCount
+        {
+            get { return parts.Count; }
+            set
+            {
+                while (parts.Count > value) parts.RemoveAt(parts.Count - 1);
+                while (parts.Count < value) parts.Add(new int[0]);
+            }
+        }
+        public void SetTriangles(System.Collections.Generic.List<int> corners, int submesh, bool calculateBounds)
+        {
+            foreach (int corner in corners)
+                if (corner < 0 || corner >= vertexCount) throw new ArgumentOutOfRangeException("corners");
+            parts[submesh] = corners.ToArray();
+        }
+        public int[] GetTriangles(int submesh) { return parts[submesh]; }
+        public void Clear()
+        {
+            vertices = new Vector3[0];
+            parts.Clear();
+        }
         public void RecalculateBounds() { }
         public int GetVertexAttributeStream(Rendering.VertexAttribute attribute) { return 0; }
         public int GetVertexAttributeOffset(Rendering.VertexAttribute attribute) { return 0; }
@@ -50,11 +73,13 @@ namespace UnityEngine
         public void SetVertexBufferParams(int count, params Rendering.VertexAttributeDescriptor[] layout)
         {
             stride = 12;
+            if (points.Length != count) vertices = new Vector3[count];
         }
         public void SetVertexBufferData<T>(Unity.Collections.NativeArray<T> data, int dataStart, int meshStart, int count,
                                            int streamIndex, Rendering.MeshUpdateFlags flags) where T : struct
         {
             if (Marshal.SizeOf(typeof(T)) * count != stream.Length) throw new ArgumentException("not the stream's size");
+            if (streamIndex != 0) return;
             Marshal.Copy(data.pointer, stream, 0, stream.Length);
         }
         public static MeshDataArray AcquireReadOnlyMeshData(Mesh mesh) { return new MeshDataArray(mesh); }
@@ -80,7 +105,7 @@ namespace UnityEngine
 namespace UnityEngine.Rendering
 {
     public enum IndexFormat { UInt16, UInt32 }
-    public enum VertexAttribute { Position, Normal }
+    public enum VertexAttribute { Position, Normal, TexCoord0 }
     public enum VertexAttributeFormat { Float32 }
     [Flags]
     public enum MeshUpdateFlags { Default = 0, DontValidateIndices = 1, DontNotifyMeshUsers = 4, DontRecalculateBounds = 8 }

@@ -198,7 +198,11 @@ namespace UnityEngine
 
     public class MeshCollider : Component { public Mesh sharedMesh; }
     public class MeshFilter : Component { public Mesh sharedMesh; }
-    public class MeshRenderer : Component { public Material sharedMaterial; }
+    public class MeshRenderer : Component
+    {
+        public Material[] sharedMaterials = new Material[1];
+        public Material sharedMaterial { get { return sharedMaterials[0]; } set { sharedMaterials[0] = value; } }
+    }
     public class Shader : Object { public static Shader Find(string name) { return new Shader(); } }
     public class Material : Object { public Color color; public Material(Shader shader) { } }
     public class Camera : Component

@@ -15,15 +15,22 @@ namespace Upt.Tests
         private string folder;
         private uint[] held;
 
-        /// <summary>A bundle whose first held nodes are a group.</summary>
         [SetUp]
         public void MakeBundle()
         {
+            folder = BundleWithGroup();
+            using (Model model = new Model(folder, 1)) held = model.SupportNodes(0);
+        }
+
+        /// <summary>The folder of a bundle whose first held nodes are a group.</summary>
+        internal static string BundleWithGroup()
+        {
             string bundle = Environment.GetEnvironmentVariable("UPT_TEST_CORRECTED");
             Assert.That(bundle, Is.Not.Null.And.Not.Empty, "UPT_TEST_CORRECTED is not set: run tests/csharp/run.sh");
+            uint[] held;
             using (Model model = new Model(bundle, 1)) held = model.Indices(Native.UPT_SET_FIXED_NODES);
             Array.Resize(ref held, held.Length / 2);
-            folder = Path.Combine(Path.GetTempPath(), Path.GetRandomFileName());
+            string folder = Path.Combine(Path.GetTempPath(), Path.GetRandomFileName());
             Directory.CreateDirectory(folder);
             foreach (string file in Directory.GetFiles(bundle))
                 File.Copy(file, Path.Combine(folder, Path.GetFileName(file)));
@@ -38,6 +45,7 @@ namespace Upt.Tests
                 string own = BitConverter.ToString(sum).Replace("-", "").ToLowerInvariant();
                 File.WriteAllText(path, text.Replace(blank, blank.Replace(new string('0', 64), own)));
             }
+            return folder;
         }
 
         [TearDown]

@@ -13,7 +13,7 @@ namespace Upt
     /// time that a step takes behind the instruments.
     /// </summary>
     [RequireComponent(typeof(MeshFilter))]
-    public sealed class SoftTissue : MonoBehaviour
+    public sealed partial class SoftTissue : MonoBehaviour
     {
         [Tooltip("The model asset.")]
         public UptModel model;
@@ -72,6 +72,7 @@ namespace Upt
         private bool presents;
         private upt_instrument[] poses = new upt_instrument[4];
         private upt_instrument[] stepPoses = new upt_instrument[4];
+        private uint[] touchable;
         private uint[] contactNodes;
         private float[] contactVectors;
         private int contactCount;
@@ -233,6 +234,7 @@ namespace Upt
             LastStats = scene.Stats();
             playhead = new Playhead(playhead.Step);
             clock = new FrameClock(playhead.Step);
+            Heal();
         }
 
         private void Open()
@@ -262,7 +264,7 @@ namespace Upt
                 step_s = step,
             });
             solvesContact = Solves(scene);
-            uint[] touchable = native.Indices(Native.UPT_SET_SURFACE_NODES);
+            touchable = native.Indices(Native.UPT_SET_SURFACE_NODES);
             // What instruments touch; the attached points' nodes are decoded beside it, the rest of the volume is not.
             scene.SetRegion(touchable);
             scene.AttachPoints(surface.PointsInBundle());
@@ -275,10 +277,12 @@ namespace Upt
             presents = solvesContact && surface.TryPresent(scene);
             LastStats = scene.Stats();
             filter.sharedMesh = surface.Mesh;
+            BeginSupports();
         }
 
         private void Close()
         {
+            CloseCuts();
             if (scene != null) scene.Dispose();
             if (surface != null)
             {
@@ -330,27 +334,29 @@ namespace Upt
             now += deltaTime;
             int count = TakePoses();
             clock.Moved(now, poses, count);
+            LookAtSupports(deltaTime);
             if (inFlight) Collect();
             CatchUp();
             using (UploadMarker.Auto())
             {
-                surface.Present(scene, clock.Since(now), poses, count);
+                Show(count);
                 // A step that finished after it was asked for has changed the state under the frame.
                 if (inFlight && scene.Stats().step_count != LastStats.step_count)
                 {
                     clock.Published();
                     Collect();
-                    surface.Present(scene, clock.Since(now), poses, count);
+                    Show(count);
                 }
-                surface.Upload(recalculateNormals);
+                Upload();
             }
             if (inFlight || !clock.IsDue(now)) return;
             using (ContactMarker.Auto())
             {
+                Operate();
                 submittedCount = clock.Start(now, ref stepPoses);
                 inFlight = true;
                 TakePlaces();
-                scene.Submit(StepInput.OfInstruments(stepPoses, submittedCount));
+                scene.Submit(OfStep());
             }
         }
 
@@ -363,11 +369,12 @@ namespace Upt
                 if (LastStats.step_ms > 500.0 * clock.Step) return;
                 using (ContactMarker.Auto())
                 {
+                    Operate();
                     submittedCount = clock.Start(now, ref stepPoses);
                     TakePlaces();
                     try
                     {
-                        scene.Step(StepInput.OfInstruments(stepPoses, submittedCount), null);
+                        scene.Step(OfStep(), null);
                     }
                     catch (UptException error)
                     {
@@ -479,7 +486,8 @@ namespace Upt
 
         private bool TakesPart(int index)
         {
-            return index < instruments.Count && instruments[index] != null && instruments[index].isActiveAndEnabled;
+            return index < instruments.Count && instruments[index] != null && instruments[index].isActiveAndEnabled &&
+                   !IsInSlit(instruments[index]);
         }
 
         /// <summary>A small sphere that touches nothing.</summary>

@@ -84,7 +84,7 @@ namespace Upt
         {
             try
             {
-                Present(scene, 0.0, null, 0);
+                Present(scene, 0.0, default(StepInput));
             }
             catch (UptException error)
             {
@@ -94,11 +94,11 @@ namespace Upt
             return true;
         }
 
-        /// <summary>Takes the tissue <paramref name="seconds"/> after the last published step, with the instruments where
-        /// they are then. No managed memory is allocated.</summary>
-        public void Present(Scene scene, double seconds, upt_instrument[] instruments, int count)
+        /// <summary>Takes the tissue <paramref name="seconds"/> after the last published step, with the instruments and supports
+        /// where they are then. No managed memory is allocated.</summary>
+        public void Present(Scene scene, double seconds, StepInput input)
         {
-            scene.Present(StepInput.OfInstruments(instruments, count), seconds, Native.UPT_VIEW_POINTS,
+            scene.Present(input, seconds, Native.UPT_VIEW_POINTS,
                           (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement), displacement.Length);
         }
 

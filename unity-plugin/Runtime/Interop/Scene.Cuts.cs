@@ -31,20 +31,36 @@ namespace Upt.Interop
         /// <summary>Cuts along the way of a blade's edge of <paramref name="edgePoints"/> points through the tissue as it is
         /// now; <paramref name="poses"/> is <c>[poses,edgePoints,3]</c>, mm. Calls with the same
         /// <paramref name="stroke"/> are one blade that goes on. Throws <c>UPT_ERR_UNSUPPORTED</c> where the scene does not
-        /// correct, and with a region, attached points or haptics.</summary>
+        /// correct, and where a support moves.</summary>
         public upt_cut Cut(int stroke, float[] poses, int edgePoints)
+        {
+            return CutWith(default(Blade), stroke, poses, edgePoints);
+        }
+
+        /// <summary>The same by a blade that feels the tissue (<c>force</c>), and is felt. It may refuse to cut: nothing has changed then, and
+        /// <c>area_mm2</c> is 0.</summary>
+        public upt_cut CutWith(Blade blade, int stroke, float[] poses, int edgePoints)
         {
             if (poses == null) throw new ArgumentNullException("poses");
             if (edgePoints < 2 || poses.Length % (3 * edgePoints) != 0)
                 throw new ArgumentException("poses hold " + poses.Length + " floats, which are no poses of " + edgePoints +
                                             " points", "poses");
+            upt_blade own = default(upt_blade);
+            own.struct_size = (uint)sizeof(upt_blade);
+            own.fracture_energy = blade.FractureEnergy;
+            own.threshold = blade.Threshold;
+            own.pushed = blade.Pushed;
+            own.ahead[0] = blade.Ahead.X;
+            own.ahead[1] = blade.Ahead.Y;
+            own.ahead[2] = blade.Ahead.Z;
             upt_cut made = Blank();
             IntPtr scene = Enter();
             try
             {
                 ulong count = (ulong)(poses.Length / (3 * edgePoints));
                 fixed (float* p = poses)
-                    Status.Check(Native.upt_scene_cut(scene, unchecked((uint)stroke), p, count, (ulong)edgePoints, &made));
+                    Status.Check(Native.upt_scene_cut_with(scene, &own, unchecked((uint)stroke), p, count, (ulong)edgePoints,
+                                                           &made));
             }
             finally { Leave(); }
             Fit();
@@ -118,7 +134,7 @@ namespace Upt.Interop
             finally { Leave(); }
             surface.FirstVertex = checked((int)now.first_vertex);
             surface.IsNew = now.is_new != 0;
-            return now.changed_count > 0;
+            return now.changed_count > 0 || now.first_vertex < now.vertex_count;
         }
 
         /// <summary>Where the vertices of the surface are in the last state, <c>[v,3]</c>, mm. Throws <c>UPT_ERR_STATE</c>
@@ -141,7 +157,7 @@ namespace Upt.Interop
             return made;
         }
 
-        // The scene may have other nodes now. Only a scene without a region is cut.
+        // The scene may have other nodes now; a region stays the nodes that it was.
         private void Fit()
         {
             ulong count = 0;
@@ -151,7 +167,7 @@ namespace Upt.Interop
             int nodes = checked((int)count);
             if (nodes == NodeCount) return;
             NodeCount = nodes;
-            RegionCount = nodes;
+            if (!hasRegion) RegionCount = nodes;
         }
     }
 }

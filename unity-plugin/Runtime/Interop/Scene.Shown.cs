@@ -41,8 +41,8 @@ namespace Upt.Interop
         }
 
         /// <summary>Displacement at <paramref name="when"/>, between steps, with the instruments or nodes of
-        /// <paramref name="input"/> where they are then: of the region, or of the attached points
-        /// (<c>UPT_VIEW_*</c>). The moment is on the clock of the steps' times, or without one the time since the last
+        /// <paramref name="input"/> where they are then: of the region, of the attached points, or of the vertices of the
+        /// surface (<c>UPT_VIEW_*</c>). The moment is on the clock of the steps' times, or without one the time since the last
         /// published step, s. Throws <c>UPT_ERR_UNSUPPORTED</c> where the scene does not correct. The pointer may be a
         /// <c>NativeArray</c>'s.</summary>
         public void Present(StepInput input, double when, int view, float* output, int floats)

@@ -10,6 +10,7 @@ namespace Upt.Interop
     public sealed unsafe partial class Scene : IDisposable
     {
         private readonly SceneHandle handle;
+        private bool hasRegion;
 
         /// <summary>Number of mesh nodes, <c>K</c>, and of the copies that cuts have made.</summary>
         public int NodeCount { get; private set; }
@@ -186,7 +187,8 @@ namespace Upt.Interop
                     Status.Check(Native.upt_scene_set_region(scene, n, nodes == null ? 0 : (ulong)nodes.Length));
             }
             finally { Leave(); }
-            RegionCount = nodes == null || nodes.Length == 0 ? NodeCount : nodes.Length;
+            hasRegion = nodes != null && nodes.Length > 0;
+            RegionCount = hasRegion ? nodes.Length : NodeCount;
         }
 
         /// <summary>Displacement of any nodes, decoded now from the latest state.</summary>
