@@ -45,6 +45,7 @@ cmake -S "$root/tests/c" -B "$build/tests" -DCMAKE_BUILD_TYPE=RelWithDebInfo \
   -DCMAKE_PREFIX_PATH="$prefix" -DUPT_ROOT="$root" -DUPT_PREFIX="$prefix" \
   -DUPT_FIXTURE="$root/tests/fixtures/tiny-upt" \
   -DUPT_REDUCED="$root/tests/fixtures/tiny-reduced" -DUPT_CORRECTED="$root/tests/fixtures/tiny-corrected" -DUPT_BRAIN="$brain" \
+  -DUPT_LIVER="$bundles/liver-coarse" \
   -DUPT_FAULT_DIR="$build/fault/release" >"$build/configure.log"
 cmake --build "$build/tests" --parallel 2 >"$build/build.log" || {
   cat "$build/build.log"
