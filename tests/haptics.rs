@@ -2,6 +2,8 @@
 #![cfg(feature = "instruments")]
 
 mod fixture;
+#[path = "haptics/loads.rs"]
+mod loads;
 
 use contact::Shape;
 use fixture::{model, plain, scene};

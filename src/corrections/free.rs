@@ -53,7 +53,7 @@ impl ImplicitSolver {
             }
             if report.fell_back {
                 self.stop_next();
-                self.leave_load();
+                self.leave_load()?;
             }
             self.next.min_det = report.min_det;
             self.estimate(&mut report);

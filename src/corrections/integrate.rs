@@ -60,6 +60,7 @@ impl ImplicitSolver {
         self.next.velocity.fill(0.0);
         self.next.velocity_before.fill(0.0);
         self.next.inertia.fill(0.0);
+        self.next.load.clear();
         self.next.truncated_mm = 0.0;
         self.clear_pairs();
     }
@@ -116,7 +117,7 @@ impl ImplicitSolver {
         let nodes = (next.len() / 3) as f64;
         let [bend, jerk] = [0, 1].map(|at| (sums.total(at) / nodes).sqrt());
         let truncated = libm::hypot(BEND * bend, JERK * jerk);
-        self.leave_load();
+        self.leave_load()?;
         let own = &mut self.next;
         own.min_det = 1.0;
         own.level = 0;

@@ -46,10 +46,12 @@ impl ImplicitSolver {
         true
     }
 
-    /// Takes the loads off the inertia of the state being made.
-    pub(super) fn leave_load(&mut self) {
+    /// Takes the loads off the inertia of the state being made, which keeps them.
+    pub(super) fn leave_load(&mut self) -> Result<()> {
+        memory::replace(&mut self.next.load, &self.load, "the loads of a scene")?;
         for (inertia, load) in self.next.inertia.iter_mut().zip(&self.load) {
             *inertia -= load;
         }
+        Ok(())
     }
 }

@@ -19,6 +19,9 @@ pub struct Motion {
     /// `M (a + alpha v)` at the last state, less the loads beside contact, µN.
     #[serde(with = "stored")]
     pub inertia: Vec<f32>,
+    /// These loads at the last state, relaxing tissue's among them; empty where there were none. Inertia and loads together are `M (a + alpha v)`.
+    #[serde(with = "stored")]
+    pub load: Vec<f32>,
     /// Smallest det F of the last corrected state.
     pub min_det: f32,
     /// How far from the tools the next step iterates, a level of the near set (`src/corrections/local/near.rs`).
@@ -38,6 +41,7 @@ impl Motion {
             velocity: memory::zeros(len, "velocities")?,
             velocity_before: memory::zeros(len, "velocities")?,
             inertia: memory::zeros(len, "inertia")?,
+            load: Vec::new(),
             min_det: 1.0,
             level: 0,
             truncated_mm: 0.0,
@@ -52,6 +56,7 @@ impl Motion {
             velocity,
             velocity_before,
             inertia,
+            load,
             min_det,
             level,
             truncated_mm,
@@ -60,6 +65,9 @@ impl Motion {
         } = self;
         for field in [velocity, velocity_before, inertia] {
             stored::check(field, len)?;
+        }
+        if !load.is_empty() {
+            stored::check(load, len)?;
         }
         if *level as usize >= LEVELS {
             return Err(Error::Snapshot(format!(
@@ -80,6 +88,7 @@ impl Motion {
             velocity: copied(&self.velocity)?,
             velocity_before: copied(&self.velocity_before)?,
             inertia: copied(&self.inertia)?,
+            load: copied(&self.load)?,
             min_det: self.min_det,
             level: self.level,
             truncated_mm: self.truncated_mm,
@@ -94,9 +103,12 @@ impl Motion {
     /// [`crate::Error::OutOfMemory`]: nothing has changed.
     pub(super) fn take(&mut self, other: &Motion) -> Result<()> {
         memory::fit(&mut self.reaction, other.reaction.len(), "contact forces")?;
+        memory::fit(&mut self.load, other.load.len(), "the loads of a scene")?;
         self.velocity.copy_from_slice(&other.velocity);
         self.velocity_before.copy_from_slice(&other.velocity_before);
         self.inertia.copy_from_slice(&other.inertia);
+        self.load.clear();
+        self.load.extend_from_slice(&other.load);
         self.min_det = other.min_det;
         self.level = other.level;
         self.truncated_mm = other.truncated_mm;
@@ -110,6 +122,7 @@ impl Motion {
         self.velocity.fill(0.0);
         self.velocity_before.fill(0.0);
         self.inertia.fill(0.0);
+        self.load.clear();
         self.min_det = 1.0;
         self.level = 0;
         self.truncated_mm = 0.0;

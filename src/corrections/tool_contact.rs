@@ -149,7 +149,7 @@ impl ImplicitSolver {
             next.copy_from_slice(&u);
             if report.fell_back {
                 self.stop_next();
-                self.leave_load();
+                self.leave_load()?;
             }
             self.next.min_det = report.min_det;
             self.next.level = report.level as u32;

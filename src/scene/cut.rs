@@ -300,6 +300,7 @@ impl Core {
             velocity: memory::zeros(len, SCENE)?,
             velocity_before: memory::zeros(len, SCENE)?,
             inertia: memory::zeros(len, SCENE)?,
+            load: memory::zeros(if was.load.is_empty() { 0 } else { len }, SCENE)?,
             min_det: was.min_det,
             level: was.level,
             truncated_mm: was.truncated_mm,
@@ -309,12 +310,16 @@ impl Core {
         spread(&was.velocity, &mut motion.velocity, source);
         spread(&was.velocity_before, &mut motion.velocity_before, source);
         spread(&was.inertia, &mut motion.inertia, source);
-        // Inertia is that of the mass which is at the node now.
+        if !was.load.is_empty() {
+            spread(&was.load, &mut motion.load, source);
+        }
+        // Inertia is that of the mass which is at the node now, and the loads with it.
         let (now, then) = (self.model.corrections()?, before.model.corrections()?);
         let (now, then) = (&now.body.mass, &then.body.mass);
-        for (node, inertia) in motion.inertia.chunks_exact_mut(3).enumerate() {
-            let part = now[node] / then[source(node)].max(f32::MIN_POSITIVE);
-            inertia.iter_mut().for_each(|x| *x *= part);
+        let part = |node: usize| now[node] / then[source(node)].max(f32::MIN_POSITIVE);
+        for field in [&mut motion.inertia, &mut motion.load] {
+            let rows = field.chunks_exact_mut(3).enumerate();
+            rows.for_each(|(node, row)| row.iter_mut().for_each(|x| *x *= part(node)));
         }
         debug_assert_eq!(own.basis_starts.len(), old.basis_starts.len());
         self.put_history(Some(History {

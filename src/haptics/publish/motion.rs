@@ -54,6 +54,8 @@ impl Carried {
 struct Field<'a> {
     /// `[K,3]`.
     of: &'a [f32],
+    /// What is added to it `[K,3]`; empty for nothing.
+    more: &'a [f32],
     /// Whether it is multiplied with the mass.
     by_mass: bool,
     /// Times the mass and `v_b`: what it loses.
@@ -92,7 +94,10 @@ pub(super) fn modal(
             let base = carried.velocity(groups, node as u32);
             *to = match body.held.is[node] {
                 true => [0.0; 3],
-                false => [0, 1, 2].map(|k| own * from[k] - field.less * mass * base[k]),
+                false => [0, 1, 2].map(|k| {
+                    let more = field.more.get(3 * node + k).copied().unwrap_or(0.0);
+                    own * from[k] + more - field.less * mass * base[k]
+                }),
             };
         }
         let (isa, pool, q) = (step.isa, step.pool, &mut *room.coordinates);
@@ -105,11 +110,14 @@ pub(super) fn modal(
     };
     let moves = Field {
         of: &step.motion.velocity,
+        more: &[],
         by_mass: true,
         less: 1.0,
     };
     let pushes = Field {
         of: &step.motion.inertia,
+        // What acts beside contact goes on as it was, and drives nothing.
+        more: &step.motion.load,
         by_mass: false,
         less: step.integrator.damping_per_s as f32,
     };

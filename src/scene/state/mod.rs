@@ -81,10 +81,10 @@ impl Core {
     /// Bytes of a saved state at most.
     pub(super) fn most_bytes(&self) -> usize {
         let count = self.mesh.node_count();
-        // Three velocities, contact forces, pairs; of local ones six fields, and numbers of chunks and modes.
+        // Three velocities, loads, contact forces, pairs; of local ones six fields, and numbers of chunks and modes.
         let history = self.corrected.as_ref().map(|corrected| {
             let stresses = corrected.solver.remembered_bytes();
-            (4 + 8 * PAIRS) * 12 * count + PAIRS * 16384 + stresses
+            (5 + 8 * PAIRS) * 12 * count + PAIRS * 16384 + stresses
         });
         let (contacts, fields) = (2 * 16 * count, 2 * 12 * count);
         let rest = history.unwrap_or(0) + self.tool_bytes() + self.load_bytes() + 2048;
