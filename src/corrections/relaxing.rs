@@ -23,6 +23,8 @@ pub(super) struct Relaxing {
     pub(super) since_s: f64,
     pub(super) next_since_s: f64,
     pub(super) next_is_new: bool,
+    /// Whether `pushes` are those of the step from the last published state.
+    pub(super) is_ready: bool,
     /// What it pushes with at the start and the end of the scene's step `[K,3]`, µN.
     pub(super) pushes: [Vec<f32>; 2],
 }
@@ -43,6 +45,7 @@ impl Relaxing {
             since_s: 0.0,
             next_since_s: 0.0,
             next_is_new: false,
+            is_ready: false,
             pushes: [push()?, push()?],
         };
         Ok(Some(memory::boxed(own, WHAT)?))
@@ -52,6 +55,7 @@ impl Relaxing {
     pub(super) fn clear(&mut self) {
         self.history.clear();
         self.since_s = 0.0;
+        self.is_ready = false;
         self.pushes.iter_mut().for_each(|push| push.fill(0.0));
     }
 
@@ -61,6 +65,7 @@ impl Relaxing {
             self.history.clear();
         }
         self.since_s = self.next_since_s;
+        self.is_ready = false;
     }
 
     /// Whether it pushes nothing in this step.
@@ -101,6 +106,7 @@ impl Relaxing {
             own.copy_from_slice(other);
         }
         self.since_s = remembered.since_s;
+        self.is_ready = false;
     }
 }
 

@@ -24,7 +24,12 @@ impl ImplicitSolver {
         own.next_since_s = step_s;
         own.next_is_new = input.still;
         if input.still {
+            own.is_ready = false;
             own.pushes.iter_mut().for_each(|push| push.fill(0.0));
+            return Ok(());
+        }
+        // A step that is made a second time, with other contact or none.
+        if std::mem::replace(&mut own.is_ready, true) {
             return Ok(());
         }
         let forces = &context.corrections.body.forces;
@@ -50,7 +55,10 @@ impl ImplicitSolver {
         own.since_s = 0.0;
         let failed = failed.into_inner();
         match failed.unwrap_or_else(std::sync::PoisonError::into_inner) {
-            Some(error) => Err(error.into()),
+            Some(error) => {
+                own.is_ready = false;
+                Err(error.into())
+            }
             None => Ok(()),
         }
     }
@@ -69,7 +77,7 @@ impl ImplicitSolver {
         }
     }
 
-    /// Takes what the same tissue remembered before it was cut; `parents` of the elements of both bodies.
+    /// Takes what the same tissue remembered before it was cut; `sources` are the numbers there of what each element stems from.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
@@ -77,15 +85,16 @@ impl ImplicitSolver {
         &mut self,
         corrections: &Corrections,
         (before, other): (&ImplicitSolver, &Corrections),
-        parents: [&[u32]; 2],
+        sources: &[u32],
     ) -> Result<()> {
         let (Some(own), Some(from)) = (&mut self.relaxing, &before.relaxing) else {
             return Ok(());
         };
         let [forces, source] = [corrections, other].map(|own| &own.body.forces);
-        let taken = forces.follow_history(&mut own.history, (source, &from.history), parents);
+        let taken = forces.follow_history(&mut own.history, (source, &from.history), sources);
         memory::tried(taken, WHAT)?;
         own.since_s = from.since_s;
+        own.is_ready = false;
         Ok(())
     }
 

@@ -329,7 +329,7 @@ impl Core {
             linearisation: Linearisation::default(),
             relaxing: None,
         }))?;
-        self.take_stresses(before)?;
+        self.take_stresses(before, source)?;
         let Some(problem) = &before.problem else {
             return Ok(());
         };

@@ -1,5 +1,7 @@
 //! A cut body that relaxes: its elements remember what those that they stem from do.
 
+use topology::{Element, origin};
+
 use super::core::Core;
 use crate::error::Result;
 use crate::memory;
@@ -7,32 +9,42 @@ use crate::memory;
 const WHAT: &str = "the stresses of a cut body";
 
 impl Core {
-    /// Takes what relaxing tissue remembers of the core before it.
-    pub(super) fn take_stresses(&mut self, before: &Core) -> Result<()> {
-        let (now, then) = (self.parents()?, before.parents()?);
-        let (Some(own), Some(old)) = (&mut self.corrected, &before.corrected) else {
+    /// Takes what relaxing tissue remembers of the core before it; `source` is the node there of each node.
+    pub(super) fn take_stresses(
+        &mut self,
+        before: &Core,
+        source: impl Fn(usize) -> usize,
+    ) -> Result<()> {
+        let (Some(own), Some(old)) = (&self.corrected, &before.corrected) else {
             return Ok(());
         };
-        let source = (&*old.solver, before.model.corrections()?);
-        (own.solver).remember_as(self.model.corrections()?, source, [&now, &then])
+        if !own.solver.relaxes() {
+            return Ok(());
+        }
+        let sources = self.element_sources(before, source)?;
+        let from = (&*old.solver, before.model.corrections()?);
+        let corrections = self.model.corrections()?;
+        match &mut self.corrected {
+            Some(own) => own.solver.remember_as(corrections, from, &sources),
+            None => Ok(()),
+        }
     }
 
-    /// The mesh element that each element of a relaxing body stems from, by its number.
-    fn parents(&self) -> Result<Vec<u32>> {
-        let relaxes = self
-            .corrected
-            .as_ref()
-            .is_some_and(|own| own.solver.relaxes());
-        if !relaxes {
-            return Ok(Vec::new());
-        }
+    /// The number, in the body before, of what each element stems from, by its own number. Cells of one mesh element that an earlier cut has parted have been
+    /// strained on their own since.
+    fn element_sources(&self, before: &Core, source: impl Fn(usize) -> usize) -> Result<Vec<u32>> {
         let intact = self.intact_mesh().tets.len() as u32 / 4;
-        let mut parents = memory::collected(intact as usize, 0..intact, WHAT)?;
-        if let Some(cut) = &self.cut {
-            let new = cut.body.changes().new;
-            memory::reserve(&mut parents, new.len(), WHAT)?;
-            parents.extend(new.iter().map(|element| element.parent));
+        let mut sources = memory::collected(intact as usize, 0..intact, WHAT)?;
+        let cells = |core: &Core| -> Vec<Element> {
+            let cut = core.cut.as_ref();
+            cut.map_or_else(Vec::new, |cut| cut.body.changes().new)
+        };
+        let (own, old) = (cells(self), cells(before));
+        memory::reserve(&mut sources, own.len(), WHAT)?;
+        for element in &own {
+            let place = origin(element, &old, |node| source(node as usize) as u32);
+            sources.push(place.map_or(element.parent, |place| intact + place as u32));
         }
-        Ok(parents)
+        Ok(sources)
     }
 }

@@ -81,8 +81,7 @@ impl StressHistory {
         self.values.each_mut().map(|values| values.as_mut_ptr())
     }
 
-    /// Takes what the elements of another packing of the body have, by the mesh elements that both stem from: `parents` of their numbers, of this packing
-    /// and of the other.
+    /// Takes what the elements of another packing of the body have: `sources` are the numbers there of what each of its own stems from.
     ///
     /// # Errors
     /// No memory.
@@ -90,18 +89,20 @@ impl StressHistory {
         &mut self,
         own: &Partition,
         (other, from): (&Partition, &StressHistory),
-        [parents, from_parents]: [&[u32]; 2],
+        sources: &[u32],
     ) -> Result<(), TryReserveError> {
         let row = (self.branches + 1) * SIX;
-        let most = parents.iter().chain(from_parents).max();
+        let most = sources.iter().max();
         let mut all = filled(most.map_or(0, |most| *most as usize + 1) * row, 0.0)?;
         from.each(other, |number, k, value| {
-            all[from_parents[number as usize] as usize * row + k] = value;
+            if let Some(place) = all.get_mut(number as usize * row + k) {
+                *place = value;
+            }
         });
         let branches = self.branches;
         for (kind, values) in self.values.iter_mut().enumerate() {
             visit(own, kind, branches, |number, k, at| {
-                values[at] = all[parents[number as usize] as usize * row + k];
+                values[at] = all[sources[number as usize] as usize * row + k];
             });
         }
         Ok(())
@@ -163,9 +164,9 @@ impl ElementForces {
         &self,
         own: &mut StressHistory,
         (other, from): (&ElementForces, &StressHistory),
-        parents: [&[u32]; 2],
+        sources: &[u32],
     ) -> Result<(), TryReserveError> {
-        own.take(&self.partition, (&other.partition, from), parents)
+        own.take(&self.partition, (&other.partition, from), sources)
     }
 
     /// The material's relaxation.

@@ -27,6 +27,22 @@ pub struct Changes {
     pub new: Vec<Element>,
 }
 
+/// The place of what an element stems from among the elements of the body before an operation, ascending by parent: of those of the same mesh element the one
+/// on the nodes that its own were copied from (`source`). None where that mesh element is not in the list.
+pub fn origin(element: &Element, before: &[Element], source: impl Fn(u32) -> u32) -> Option<usize> {
+    let corners = element.nodes.map(source);
+    let first = before.partition_point(|other| other.parent < element.parent);
+    let end = before.partition_point(|other| other.parent <= element.parent);
+    let shared = |other: &Element| {
+        let pairs = other.nodes.iter().zip(&corners);
+        pairs.filter(|(a, b)| a == b).count()
+    };
+    // Of equals the first.
+    (first..end)
+        .rev()
+        .max_by_key(|place| shared(&before[*place]))
+}
+
 impl Body {
     /// What is not as in the mesh.
     pub fn changes(&self) -> Changes {

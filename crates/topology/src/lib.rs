@@ -42,7 +42,7 @@ mod touchable;
 
 pub use blade::Blade;
 pub use body::{Body, Cell, Change};
-pub use elements::{Changes, Element};
+pub use elements::{Changes, Element, origin};
 pub use error::TopologyError;
 pub use fragments::Fragment;
 pub use kept::Kept;

@@ -10,7 +10,9 @@ use super::{Solver, SolverError};
 use contact::{SPACING_MM, Samples};
 use elements::{PADDING, Partition, Tetrahedra};
 use std::sync::Arc;
-use topology::{Blade, Body, Change, Fragment, Point, RestMesh, Sweep, TopologyError};
+use topology::{
+    Blade, Body, Change, Element, Fragment, Point, RestMesh, Sweep, TopologyError, origin,
+};
 
 impl Solver {
     /// A blade's edge passes a sweep, in the tissue as it is now: see [`Body::cut`].
@@ -135,11 +137,10 @@ impl Solver {
         let positions: Vec<[f32; 3]> = (0..body.node_count() as u32)
             .map(|node| self.positions[body.parent(node) as usize])
             .collect();
-        let (mut tets, mut shares, mut parents) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut tets, mut shares) = (Vec::new(), Vec::new());
         let mut stiffness = Vec::new();
         for element in body.elements() {
             tets.push(element.nodes);
-            parents.push(element.parent);
             shares.push(element.share as f32);
             let own = self.topology.stiffness.get(element.parent as usize);
             stiffness.push(own.copied().unwrap_or(1.0) * element.stiffness);
@@ -157,7 +158,7 @@ impl Solver {
             while node >= first {
                 node = change.copied[node - first] as usize;
             }
-            self.partition.slot_of_node[node]
+            node
         };
         let mut fields = super::Fields::default();
         for field in [
@@ -168,13 +169,13 @@ impl Solver {
             field.resize(parts.partition.node_of_slot.len(), Node::default());
         }
         for (node, &slot) in parts.partition.slot_of_node.iter().enumerate() {
-            let from = source(node) as usize;
+            let from = self.partition.slot_of_node[source(node)] as usize;
             if slot != PADDING && from != PADDING as usize {
                 fields.displacement[slot as usize] = self.fields.displacement[from];
                 fields.increment[slot as usize] = self.fields.increment[from];
             }
         }
-        let relaxing = self.follow_relaxing(&parts.partition, &parents)?;
+        let relaxing = self.follow_relaxing(&parts.partition, &body, source)?;
         self.partition = parts.partition;
         self.relaxing_backup.clone_from(&relaxing);
         self.relaxing = relaxing;
@@ -203,23 +204,29 @@ impl Solver {
         Ok(change)
     }
 
-    /// What relaxing elements of the body's new packing remember, which stem from the mesh elements `parents`.
+    /// What relaxing elements of the new packing of `body` remember; `source` is the node here of each node there.
     fn follow_relaxing(
         &self,
         partition: &Partition,
-        parents: &[u32],
+        body: &Body,
+        source: impl Fn(usize) -> usize,
     ) -> Result<Option<Relaxing>, SolverError> {
         let Some(before) = &self.relaxing else {
             return Ok(None);
         };
-        let from_parents: Vec<u32> = match &self.topology.body {
-            Some(body) => body.elements().map(|element| element.parent).collect(),
-            None => (0..self.tets.len() as u32).collect(),
+        let old: Vec<Element> = match &self.topology.body {
+            Some(body) => body.elements().collect(),
+            None => Vec::new(),
         };
+        let sources: Vec<u32> = (body.elements())
+            .map(|element| {
+                let place = origin(&element, &old, |node| source(node as usize) as u32);
+                place.map_or(element.parent, |place| place as u32)
+            })
+            .collect();
         let mut after = Relaxing::new(partition)?;
         if let Some(after) = &mut after {
-            let source = (&self.partition, before);
-            after.follow(partition, source, [parents, &from_parents])?;
+            after.follow(partition, (&self.partition, before), &sources)?;
         }
         Ok(after)
     }

@@ -72,14 +72,14 @@ impl Relaxing {
         self.since_s = f64::from(steps - updates * every(dt)) * dt;
     }
 
-    /// Takes over what the elements of another packing of the body remember; `parents` are the mesh elements that theirs stem from.
+    /// Takes over what the elements of another packing of the body remember; `sources` are the numbers there of what each stems from.
     pub fn follow(
         &mut self,
         partition: &Partition,
         (other, from): (&Partition, &Self),
-        parents: [&[u32]; 2],
+        sources: &[u32],
     ) -> Result<(), SolverError> {
-        (self.history).take(partition, (other, &from.history), parents)?;
+        (self.history).take(partition, (other, &from.history), sources)?;
         self.since_s = from.since_s;
         Ok(())
     }
