@@ -159,6 +159,7 @@ impl ImplicitSolver {
         next: &mut [f32],
     ) -> Result<Report> {
         self.begin_pairs();
+        let _awake = self.relaxes().then(|| context.pool.keep_awake());
         self.remember(context, input)?;
         let enough = Enough {
             iterations: input.enough.iterations.max(LEAST_SWING),

@@ -76,6 +76,7 @@ impl ImplicitSolver {
         next: &mut [f32],
     ) -> Result<Report> {
         problem.work.end_by(input.enough.until);
+        let _awake = context.pool.keep_awake();
         self.remember(context, input)?;
         let Some((substeps, substepper)) = substeps else {
             return self.correct_loaded(context, input, problem, next);

@@ -13,6 +13,8 @@ use lanes::{NodeLanes, WIDTH};
 
 /// An element below this det F keeps the stress that it had.
 const SOUND_DET: f32 = 0.05;
+/// Bytes of a line of the cache.
+const LINE: usize = 64;
 /// `J²` at least.
 const LEAST_SQUARE: f32 = 1e-4;
 
@@ -35,6 +37,13 @@ unsafe fn second_piola<L: NodeLanes>(cofactor: &[[L; 3]; 3], det: L, t: &[L; 6])
     }
 }
 
+/// Asks for `lines` of the cache that lie `bytes` behind what is at hand.
+#[inline(always)]
+fn ahead<T>(at: *const T, bytes: usize, lines: usize) {
+    let start = at.cast::<u8>().wrapping_add(bytes);
+    (0..lines).for_each(|line| lanes::prefetch(start.wrapping_add(LINE * line)));
+}
+
 /// Takes the stresses at displacements (mm) into the `history` of the clusters, and adds the forces (µN) of each row of weights that has `forces`.
 #[inline(always)]
 pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize>(
@@ -50,6 +59,8 @@ pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize>(
         let row = SIX * WIDTH;
         let mut history = history;
         for (cluster, gradients) in clusters.iter().zip(gradients) {
+            // What is remembered is more than caches hold, and no core waits for it where it is asked for a batch ahead.
+            ahead(cluster.slots.as_ptr(), size_of_val(cluster), NODES / 2 + 1);
             for first in (0..WIDTH).step_by(L::COUNT) {
                 let (edge, _) = edges::<L, NODES, TETS>(cluster, first, nodes);
                 let mut force = [[[zero; 3]; NODES]; 2];
@@ -62,6 +73,12 @@ pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize>(
                     let t = deviator(law, &Strain::new(&h));
                     let now = second_piola(&cofactor, det, &t);
                     let own = history.add(tet * (step.count + 1) * row + first);
+                    if first == 0 {
+                        let lines = (step.count + 1) * SIX;
+                        ahead(own, 4 * TETS * lines * WIDTH, lines);
+                        ahead(rows.as_ptr(), size_of_val(gradients), rows.len());
+                        ahead(&raw const gradients.volume[tet], size_of_val(gradients), 1);
+                    }
                     let mut sums = [[zero; SIX]; 2];
                     for k in 0..SIX {
                         let before = L::load(own.add(k * WIDTH));
