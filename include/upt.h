@@ -347,6 +347,11 @@
 #define UPT_FLAG_UNSOLVED 16384
 
 /**
+ * The bundle's tissue relaxes, and this scene makes no corrections, which alone know of it: what it shows and feels is elastic.
+ */
+#define UPT_FLAG_ELASTIC 32768
+
+/**
  * Nodes of the surface.
  */
 #define UPT_SET_SURFACE_NODES 0

@@ -34,6 +34,8 @@ pub mod flag {
     pub const DEEP: u32 = 8192;
     /// The solve of the instruments' contact was stopped by its bounds; the readings say what it left.
     pub const UNSOLVED: u32 = 16384;
+    /// The bundle's tissue relaxes, and this scene makes no corrections, which alone know of it: what it shows and feels is elastic.
+    pub const ELASTIC: u32 = 32768;
 
     /// What the flags say, as text.
     ///
@@ -65,6 +67,10 @@ pub mod flag {
             (
                 UNSOLVED,
                 "the instruments' contact was not solved to the end",
+            ),
+            (
+                ELASTIC,
+                "the tissue relaxes, but without corrections this scene is elastic",
             ),
         ];
         let said = meanings.iter().filter(|(flag, _)| flags & flag != 0);

@@ -205,6 +205,8 @@ class Flag(IntFlag):
     """Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue."""
     UNSOLVED = 16384
     """The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings)."""
+    ELASTIC = 32768
+    """The bundle's tissue relaxes, and this scene makes no corrections, which alone know of it: what it shows and feels is elastic."""
 
 
 class IndexSet(IntEnum):

@@ -355,6 +355,11 @@ impl Manifest {
         self.material.in_steps_of(self.dt_s)
     }
 
+    /// Whether its tissue relaxes.
+    pub fn relaxes(&self) -> bool {
+        !self.material.relaxation.is_empty()
+    }
+
     /// Length of step for a scene that presents and corrects as the bundle recommends, s: `dt_s` where a scene cannot present or has
     /// no step of its own.
     pub fn frame_step_s(&self) -> f64 {

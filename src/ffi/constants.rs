@@ -109,6 +109,8 @@ pub const UPT_FLAG_ERROR: u32 = 4096;
 pub const UPT_FLAG_DEEP: u32 = 8192;
 /// The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings).
 pub const UPT_FLAG_UNSOLVED: u32 = 16384;
+/// The bundle's tissue relaxes, and this scene makes no corrections, which alone know of it: what it shows and feels is elastic.
+pub const UPT_FLAG_ELASTIC: u32 = 32768;
 
 /// Nodes of the surface.
 pub const UPT_SET_SURFACE_NODES: i32 = 0;
@@ -208,6 +210,7 @@ const _: () = {
         UPT_FLAG_ERROR = flag::ERROR;
         UPT_FLAG_DEEP = flag::DEEP;
         UPT_FLAG_UNSOLVED = flag::UNSOLVED;
+        UPT_FLAG_ELASTIC = flag::ELASTIC;
     }
 };
 

@@ -29,7 +29,7 @@ use crate::memory::{self, HeldBytes};
 use crate::model::Model;
 use crate::options::SceneOptions;
 use crate::output::Output;
-use crate::stats::SceneStats;
+use crate::stats::{SceneStats, flag};
 
 pub(super) const SCENE: &str = "a scene's states";
 
@@ -173,7 +173,10 @@ impl Core {
     /// A blank account of a step.
     pub(super) fn blank_stats(&self) -> SceneStats {
         SceneStats {
-            flags: 0,
+            flags: match self.corrected.is_none() && self.model.manifest.relaxes() {
+                true => flag::ELASTIC,
+                false => 0,
+            },
             step_count: self.counters.step_count,
             step_ms: 0.0,
             check_ms: 0.0,

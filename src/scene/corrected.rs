@@ -143,7 +143,7 @@ impl Corrector {
             time_step: &time_step,
             held: &corrections.body.held,
         };
-        let relaxes = !model.manifest.material.relaxation.is_empty();
+        let relaxes = model.manifest.relaxes();
         Ok(Some(Corrector {
             solver: memory::boxed(ImplicitSolver::new(context)?, WHAT)?,
             substeps: None,

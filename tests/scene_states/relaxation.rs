@@ -4,7 +4,7 @@ use super::FREE;
 use super::fixture::{bits, plain, push, relaxing, scene, sparse};
 use serde_json::json;
 use std::sync::Arc;
-use upt::{Corrections, IndexSet, Model, Scene, SceneOptions};
+use upt::{Corrections, IndexSet, Model, Scene, SceneOptions, flag};
 
 /// A fast branch and a slow one; 0.3 of the stress lasts.
 fn branches() -> serde_json::Value {
@@ -110,4 +110,30 @@ fn it_recovers_slower_than_it_springs_back() {
     assert!(slow[100] < slow[30], "{} {}", slow[100], slow[30]);
     assert_eq!(slow[599], 0.0, "asleep");
     assert!(!model.indices(IndexSet::DomainNodes).is_empty());
+}
+
+/// Without corrections nothing relaxes, and every step says so.
+#[test]
+fn a_scene_without_corrections_says_that_it_is_elastic() {
+    let (_a, model) = relaxing(branches(), 1.0);
+    let (_b, elastic) = relaxing(json!([]), 1.0);
+    let without = SceneOptions {
+        corrections: Corrections::None,
+        ..plain()
+    };
+    for (model, options, said) in [
+        (&model, &without, true),
+        (&model, &options(0.0), false),
+        (&elastic, &without, false),
+    ] {
+        let scene = scene(model, options);
+        for t in 0..6 {
+            let contact = push(model, 3);
+            let input = if t < 4 { sparse(&contact) } else { FREE };
+            scene.step(input, None).unwrap();
+            let flags = scene.stats().flags;
+            assert_eq!(flags & flag::ELASTIC != 0, said, "step {t}");
+        }
+    }
+    assert!(flag::names(flag::ELASTIC).contains("elastic"));
 }

@@ -68,6 +68,7 @@ export const UPT_FLAG_FELL_BACK = 2048;
 export const UPT_FLAG_ERROR = 4096;
 export const UPT_FLAG_DEEP = 8192;
 export const UPT_FLAG_UNSOLVED = 16384;
+export const UPT_FLAG_ELASTIC = 32768;
 export const UPT_SET_SURFACE_NODES = 0;
 export const UPT_SET_DOMAIN_NODES = 1;
 export const UPT_SET_FIXED_NODES = 2;

@@ -82,6 +82,7 @@ pub(crate) fn names(flags: u32) -> String {
         (flag::ERROR, "error"),
         (flag::DEEP, "deep"),
         (flag::UNSOLVED, "unsolved"),
+        (flag::ELASTIC, "elastic"),
     ];
     let set: Vec<&str> = NAMES
         .iter()

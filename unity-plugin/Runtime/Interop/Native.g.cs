@@ -778,6 +778,8 @@ namespace Upt.Interop
         public const uint UPT_FLAG_DEEP = 8192;
         /// <summary>The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings).</summary>
         public const uint UPT_FLAG_UNSOLVED = 16384;
+        /// <summary>The bundle's tissue relaxes, and this scene makes no corrections, which alone know of it: what it shows and feels is elastic.</summary>
+        public const uint UPT_FLAG_ELASTIC = 32768;
         /// <summary>Nodes of the surface.</summary>
         public const int UPT_SET_SURFACE_NODES = 0;
         /// <summary>Nodes that instruments may touch.</summary>
