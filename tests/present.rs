@@ -2,6 +2,8 @@
 #![cfg(feature = "instruments")]
 
 mod fixture;
+#[path = "present/relaxing.rs"]
+mod relaxing;
 
 use contact::Shape;
 use fixture::{bits, model, plain, scene};

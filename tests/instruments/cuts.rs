@@ -5,6 +5,7 @@ use upt::Error;
 use upt::ffi::*;
 
 pub(crate) fn liver() -> std::sync::Arc<upt::Model> {
+    fixture::find_runtime();
     let path = std::path::Path::new("onnx/liver-coarse");
     upt::Model::open(path, &upt::ModelOptions::default()).unwrap()
 }

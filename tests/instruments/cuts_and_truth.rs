@@ -7,7 +7,7 @@ use tissue::solver::{Solver, SolverOptions, Tool as Rigid, ToolPose};
 
 /// What is done before a frame.
 #[derive(Clone)]
-enum Operation {
+pub(crate) enum Operation {
     Cut([[f32; 3]; 4]),
     /// A ball, mm, and how much it takes, mm³.
     Remove([f32; 3], f32, f32),
@@ -15,10 +15,10 @@ enum Operation {
 }
 
 /// A frame: what is done before it, and where the tool is at its end.
-type Frame = (Option<Operation>, Tool);
+pub(crate) type Frame = (Option<Operation>, Tool);
 
 /// Errors of each frame: mean squared distance, mm², and the force of the scene and of the truth, mN.
-fn compare(
+pub(crate) fn compare(
     model: &std::sync::Arc<upt::Model>,
     mesh: &str,
     frames: &[Frame],
@@ -92,7 +92,7 @@ fn compare(
 }
 
 /// The tool comes down in four frames to `depth` and stays: `count` frames in all.
-fn press(scene: &Scene, depth: f32, count: usize) -> Vec<Frame> {
+pub(crate) fn press(scene: &Scene, depth: f32, count: usize) -> Vec<Frame> {
     let down = |at: usize| {
         pressing(
             scene,
@@ -104,7 +104,7 @@ fn press(scene: &Scene, depth: f32, count: usize) -> Vec<Frame> {
 }
 
 /// Mean of the errors, and the largest of the force over the truth's largest force.
-fn errors(found: &[(f64, f32, f32)]) -> (f64, f32) {
+pub(crate) fn errors(found: &[(f64, f32, f32)]) -> (f64, f32) {
     let mean = found.iter().map(|one| one.0).sum::<f64>() / found.len() as f64;
     let largest = found.iter().map(|one| one.2).fold(0.0, f32::max);
     let off = found

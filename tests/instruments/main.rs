@@ -15,6 +15,7 @@ mod fixture;
 #[path = "../host/mod.rs"]
 mod host;
 mod portable;
+mod relaxing;
 mod through_the_abi;
 
 use contact::{Shape, Vector};

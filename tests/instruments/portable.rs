@@ -1,6 +1,7 @@
 //! The same bits on every instruction set that this machine has: each in a process of its own, since a process keeps to one.
 
 use super::cuts::slit;
+use super::relaxing::liver_that_relaxes;
 use super::*;
 use lanes::Isa;
 use sha2::{Digest, Sha256};
@@ -17,11 +18,17 @@ fn options() -> ModelOptions {
     }
 }
 
-/// Two tools with friction, one of them turning, that press and slide, substeps, a cut, a step under gravity and what is saved: SHA-256 of it.
-fn rollout() -> String {
+/// Of the liver that ships, and of tissue that relaxes by Ogden's law.
+fn rollouts() -> String {
     fixture::find_runtime();
     let path = std::path::Path::new("onnx/liver-coarse");
     let model = Model::open(path, &options()).unwrap();
+    let (_folder, relaxing) = liver_that_relaxes(Some(-12.0), &options());
+    rollout(model) + &rollout(relaxing)
+}
+
+/// Two tools with friction, one of them turning, that press and slide, substeps, a cut, a step under gravity and what is saved: SHA-256 of it.
+fn rollout(model: std::sync::Arc<Model>) -> String {
     let corrections = Corrections::Auto {
         most: 8,
         target_mm: 0.02,
@@ -71,7 +78,7 @@ fn bytemuck(values: &[f32]) -> Vec<u8> {
 /// Verifies REQ-094.
 #[test]
 fn a_portable_model_has_the_same_bits_on_every_instruction_set() {
-    let own = rollout();
+    let own = rollouts();
     if std::env::var_os(CHILD).is_some() {
         println!("portable {own}");
         return;

@@ -17,6 +17,7 @@ mod loads;
 mod mistakes;
 mod mobilise;
 mod regions;
+mod relaxing;
 mod supports;
 mod ties;
 
