@@ -6,6 +6,7 @@
 
 mod bench;
 mod compare;
+mod cuts;
 mod date;
 mod envelope;
 mod hang_report;

@@ -26,6 +26,7 @@ use std::process::ExitCode;
 use anyhow::{Result, bail};
 use tissue::mesh::Mesh;
 
+use crate::cuts;
 use crate::hang_report;
 use crate::load_report;
 use crate::shown;
@@ -44,6 +45,9 @@ use upt_cli::setting::Region;
 pub fn run(options: &Options) -> Result<ExitCode> {
     if !options.load.is_empty() {
         return load_report::report(options);
+    }
+    if options.cut > 0 {
+        return cuts::report(options);
     }
     if options.hang > 0 {
         return hang_report::report(options);

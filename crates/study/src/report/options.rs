@@ -22,6 +22,7 @@ use upt_cli::yardstick::cases::Split;
   upt-study report --load tilt,pulse,sag --bundle onnx/brain-coarse-reduced
   upt-study report --load pulse --tool press --bundle onnx/brain-coarse-reduced
   upt-study report --hang 10 --bundle onnx/brain-coarse-reduced
+  upt-study report --cut 3 --bundle onnx/liver-coarse
   upt-study report --step-ms 10,20,25,50 --tools data/brain-frames --split all --bundle onnx/brain-reduced
 
 The command writes report.json, report.html and report.md (the table for a document of yours) to --out (with --tools: tools.json and tools.html), and prints the table.")]
@@ -66,6 +67,10 @@ pub struct Options {
     /// replaces the part between the markers `study report --hang`.
     #[arg(long, value_name = "CASES", default_value_t = 0, hide_default_value = true, conflicts_with_all = ["trajectories", "data", "tools", "load"])]
     pub hang: usize,
+    /// Measure so many cases of each programme of cuts (incise, flap, resect, biopsy, divide, coagulate), in the bundles of --bundle against the reference solver,
+    /// which runs here. --markdown replaces the part between the markers `study report --cut`.
+    #[arg(long, value_name = "CASES", default_value_t = 0, hide_default_value = true, conflicts_with_all = ["trajectories", "data", "tools", "load", "hang"])]
+    pub cut: usize,
     /// With --hang: stiffness of the bed's ties together, N/m.
     #[arg(long, default_value_t = HangSizes::default().stiffness)]
     pub bed_stiffness: f32,

@@ -1,4 +1,4 @@
-//! `report --load`: gravity that turns, and pressure.
+//! `report --load`, `--hang`, `--cut`: gravity that turns, and pressure; ties; bodies that are cut.
 
 use crate::json;
 
@@ -36,4 +36,32 @@ fn a_bed_tears_as_the_solvers_does() {
     assert_eq!(row["same_first"], 3, "{row}");
     let torn = row["torn"].as_array().expect("two numbers");
     assert!(torn[0] == torn[1] && torn[0].as_u64() > Some(10), "{row}");
+}
+
+/// Each programme of cuts is the solver's, with the same blades and tools.
+#[test]
+fn bodies_are_cut_as_the_solvers_are() {
+    let asked = "--cut 1 --bundle onnx/liver-coarse --threads 1 --json";
+    let asked: Vec<&str> = asked.split(' ').collect();
+    let rows = json(&[&["report"], &asked[..]].concat());
+    let rows = rows.as_array().unwrap();
+    let names: Vec<&str> = (rows.iter())
+        .map(|row| row["programme"].as_str().unwrap())
+        .collect();
+    let all = ["incise", "flap", "resect", "biopsy", "divide", "coagulate"];
+    assert_eq!(names, all);
+    for row in rows {
+        let number = |name: &str| row[name].as_f64();
+        assert!(number("mse").unwrap() < 0.01, "{row}");
+        assert!(number("near_mse").unwrap() < 0.05, "{row}");
+        assert!(number("smallest_det").unwrap() > 0.2, "{row}");
+        // Not every programme has a blade, or takes tissue away.
+        assert!(
+            number("blade_error").is_none_or(|error| error < 0.15),
+            "{row}"
+        );
+        let left = number("removed_ratio");
+        assert!(left.is_none_or(|part| (part - 1.0).abs() < 0.1), "{row}");
+        assert!(number("force_error").unwrap() < 0.2, "{row}");
+    }
 }

@@ -1,0 +1,333 @@
+//! Programmes of cuts: what is done to the body before each frame, and where a ball is at its end.
+//!
+//! A case is a flat place of the domain, drawn from a seed. Places are millimetres from it: ahead along the surface, aside, and above the tissue.
+
+use contact::Vector;
+use upt::Scene;
+
+/// Of the ball that presses and holds, mm.
+pub const BALL_MM: f32 = 3.0;
+/// A place is flat where the surface this near to it looks the same way.
+const FLAT_MM: f32 = 12.0;
+
+/// What is done to the body.
+#[derive(Clone, Copy, Debug)]
+pub enum Operation {
+    /// A straight edge goes from one place to the next.
+    Blade {
+        stroke: u32,
+        edges: [[[f32; 3]; 2]; 2],
+    },
+    /// A ball takes what is inside of it, up to a volume.
+    Aspirate {
+        at: [f32; 3],
+        radius: f32,
+        most_mm3: f32,
+    },
+    /// Elements whose middle is inside of a ball.
+    Stiffen {
+        at: [f32; 3],
+        radius: f32,
+        factor: f32,
+    },
+    /// Pieces that nothing holds leave.
+    Drop,
+}
+
+/// A frame of 50 ms.
+#[derive(Clone, Debug, Default)]
+pub struct Frame {
+    pub operations: Vec<Operation>,
+    /// Middle of the ball at its end; none: above the place, away from the tissue.
+    pub ball: Option<[f32; 3]>,
+    pub grasp: bool,
+}
+
+/// A flat place of the domain.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    at: Vector,
+    normal: Vector,
+    along: Vector,
+    across: Vector,
+}
+
+/// A row of the table.
+pub struct Programme {
+    pub name: &'static str,
+    pub frames: fn(&Site) -> Vec<Frame>,
+    /// Whether blades feel the tissue. What pushes a piece that they have cut free throws it away, by metres in the reference solver.
+    pub feels: bool,
+}
+
+pub const PROGRAMMES: [Programme; 6] = [
+    Programme {
+        name: "incise",
+        frames: incise,
+        feels: true,
+    },
+    Programme {
+        name: "flap",
+        frames: flap,
+        feels: true,
+    },
+    Programme {
+        name: "resect",
+        frames: resect,
+        feels: true,
+    },
+    Programme {
+        name: "biopsy",
+        frames: biopsy,
+        feels: false,
+    },
+    Programme {
+        name: "divide",
+        frames: divide,
+        feels: false,
+    },
+    Programme {
+        name: "coagulate",
+        frames: coagulate,
+        feels: true,
+    },
+];
+
+impl Site {
+    /// The place of a seed, among the flattest tenth of the domain; none where the domain is small.
+    pub fn of(scene: &Scene, seed: u64) -> Option<Site> {
+        let mesh = scene.mesh();
+        let at = |node: u32| Vector::from_slice(&mesh.positions[3 * node as usize..][..3]);
+        let faces: Vec<(Vector, Vector)> = (mesh.domain_faces.chunks_exact(3))
+            .map(|face| {
+                let [a, b, c] = [0, 1, 2].map(|k| at(face[k]));
+                ((a + b + c) / 3.0, (b - a).cross(c - a))
+            })
+            .collect();
+        let mut rated: Vec<(f32, u32, Vector)> = (mesh.domain_nodes.iter())
+            .map(|&node| {
+                let near = faces
+                    .iter()
+                    .filter(|(middle, _)| (*middle - at(node)).length() < FLAT_MM);
+                let (sum, size) = near.fold((Vector::ZERO, 0.0), |(sum, size), (_, area)| {
+                    (sum + *area, size + area.length())
+                });
+                // A domain that ends here has less of it.
+                (sum.length() - 0.5 * size, node, sum)
+            })
+            .collect();
+        rated.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = rated.len().div_ceil(10);
+        let step = (0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(seed) >> 33) as usize;
+        let (_, node, sum) = *rated.get(step % best.max(1))?;
+        let normal = sum.normalize_or_zero();
+        let along = normal.any_orthonormal_vector();
+        Some(Site {
+            at: at(node),
+            normal,
+            along,
+            across: normal.cross(along),
+        })
+    }
+
+    pub fn distance(&self, place: [f32; 3]) -> f32 {
+        (Vector::from(place) - self.at).length()
+    }
+
+    /// Where the ball waits.
+    pub fn away(&self) -> [f32; 3] {
+        self.place(0.0, 0.0, 35.0)
+    }
+
+    fn place(&self, ahead: f32, aside: f32, above: f32) -> [f32; 3] {
+        let at = self.at + self.along * ahead + self.across * aside + self.normal * above;
+        at.to_array()
+    }
+
+    /// An edge that stands upright, from below to 6 mm above the tissue.
+    fn upright(&self, ahead: f32, aside: f32, depth: f32) -> [[f32; 3]; 2] {
+        [
+            self.place(ahead, aside, -depth),
+            self.place(ahead, aside, 6.0),
+        ]
+    }
+}
+
+fn cut(stroke: u32, from: [[f32; 3]; 2], to: [[f32; 3]; 2]) -> Frame {
+    Frame {
+        operations: vec![Operation::Blade {
+            stroke,
+            edges: [from, to],
+        }],
+        ..Frame::default()
+    }
+}
+
+/// The ball goes from place to place in so many frames.
+fn go(frames: &mut Vec<Frame>, grasp: bool, count: usize, from: [f32; 3], to: [f32; 3]) {
+    let (from, to) = (Vector::from(from), Vector::from(to));
+    frames.extend((1..=count).map(|at| {
+        let part = at as f32 / count as f32;
+        Frame {
+            ball: Some((from + (to - from) * part).to_array()),
+            grasp,
+            ..Frame::default()
+        }
+    }));
+}
+
+/// 24 mm long, 8 mm deep, in pieces of 2 mm; then a ball presses one lip 4 mm deep and 3 mm aside.
+fn incise(site: &Site) -> Vec<Frame> {
+    let edge = |piece: i32| site.upright(2.0 * piece as f32 - 12.0, 0.0, 8.0);
+    let mut frames: Vec<Frame> = (0..12)
+        .map(|piece| cut(0, edge(piece), edge(piece + 1)))
+        .collect();
+    let (over, deep) = (
+        site.place(0.0, 4.5, 5.0),
+        site.place(0.0, 4.5, BALL_MM - 4.0),
+    );
+    let aside = site.place(0.0, 7.5, BALL_MM - 4.0);
+    go(&mut frames, false, 4, over, deep);
+    go(&mut frames, false, 3, deep, aside);
+    go(&mut frames, false, 8, aside, aside);
+    frames
+}
+
+/// A flap of 20 x 12 mm, 5 mm thick, hangs by one side; a grasp lifts its free edge by 4 mm.
+fn flap(site: &Site) -> Vec<Frame> {
+    let mut frames = vec![
+        cut(
+            0,
+            site.upright(-10.0, 0.0, 7.0),
+            site.upright(10.0, 0.0, 7.0),
+        ),
+        cut(
+            1,
+            site.upright(-10.0, -1.0, 7.0),
+            site.upright(-10.0, 12.0, 7.0),
+        ),
+        cut(
+            2,
+            site.upright(10.0, -1.0, 7.0),
+            site.upright(10.0, 12.0, 7.0),
+        ),
+    ];
+    let under = |aside: f32| {
+        [
+            site.place(-11.0, aside, -5.0),
+            site.place(11.0, aside, -5.0),
+        ]
+    };
+    frames.push(cut(3, under(-1.0), under(12.0)));
+    let (over, on) = (
+        site.place(0.0, 4.0, 6.0),
+        site.place(0.0, 4.0, BALL_MM - 0.5),
+    );
+    let up = site.place(0.0, 4.0, BALL_MM + 4.0);
+    go(&mut frames, false, 3, over, on);
+    go(&mut frames, true, 1, on, on);
+    go(&mut frames, true, 8, on, up);
+    go(&mut frames, true, 8, up, up);
+    frames
+}
+
+/// A ball of 6 mm takes 100 mm³ a frame, 20 times, on a way of 10 mm; then a ball presses the floor of the cavity.
+fn resect(site: &Site) -> Vec<Frame> {
+    let mut frames: Vec<Frame> = (0..20)
+        .map(|at| Frame {
+            operations: vec![Operation::Aspirate {
+                at: site.place(0.5 * at as f32 - 5.0, 0.0, -3.0),
+                radius: 6.0,
+                most_mm3: 100.0,
+            }],
+            ..Frame::default()
+        })
+        .collect();
+    frames.push(Frame {
+        operations: vec![Operation::Drop],
+        ..Frame::default()
+    });
+    let (over, deep) = (
+        site.place(0.0, 0.0, 4.0),
+        site.place(0.0, 0.0, -9.0 + BALL_MM - 3.0),
+    );
+    go(&mut frames, false, 8, over, deep);
+    go(&mut frames, false, 8, deep, deep);
+    frames
+}
+
+/// A plug of 10 mm across is cut free 9 mm deep but for its base; a grasp pulls it by 4 mm.
+fn biopsy(site: &Site) -> Vec<Frame> {
+    let edge = |piece: i32| {
+        let (sin, cos) = (std::f32::consts::TAU * piece as f32 / 24.0).sin_cos();
+        site.upright(5.0 * cos, 5.0 * sin, 9.0)
+    };
+    let piece = |at: i32| Operation::Blade {
+        stroke: 0,
+        edges: [edge(at), edge(at + 1)],
+    };
+    let mut frames: Vec<Frame> = (0..12)
+        .map(|at| Frame {
+            operations: vec![piece(2 * at), piece(2 * at + 1)],
+            ..Frame::default()
+        })
+        .collect();
+    let (over, on) = (
+        site.place(0.0, 0.0, 6.0),
+        site.place(0.0, 0.0, BALL_MM - 0.5),
+    );
+    let up = site.place(0.0, 0.0, BALL_MM + 4.0);
+    go(&mut frames, false, 3, over, on);
+    go(&mut frames, true, 1, on, on);
+    go(&mut frames, true, 8, on, up);
+    go(&mut frames, true, 8, up, up);
+    frames
+}
+
+/// A cap is cut off 6 mm below the surface and leaves; a ball presses the wall 3 mm deep.
+fn divide(site: &Site) -> Vec<Frame> {
+    let edge = |aside: f32| {
+        [
+            site.place(-60.0, aside, -6.0),
+            site.place(60.0, aside, -6.0),
+        ]
+    };
+    let mut frames: Vec<Frame> = (0..12)
+        .map(|at| {
+            cut(
+                0,
+                edge(10.0 * at as f32 - 60.0),
+                edge(10.0 * at as f32 - 50.0),
+            )
+        })
+        .collect();
+    frames.push(Frame {
+        operations: vec![Operation::Drop],
+        ..Frame::default()
+    });
+    let (over, deep) = (
+        site.place(0.0, 0.0, 0.0),
+        site.place(0.0, 0.0, -6.0 + BALL_MM - 3.0),
+    );
+    go(&mut frames, false, 6, over, deep);
+    go(&mut frames, false, 8, deep, deep);
+    frames
+}
+
+/// Tissue within 10 mm becomes four times as stiff while a ball presses it 4 mm deep.
+fn coagulate(site: &Site) -> Vec<Frame> {
+    let (over, deep) = (
+        site.place(0.0, 0.0, 5.0),
+        site.place(0.0, 0.0, BALL_MM - 4.0),
+    );
+    let mut frames = Vec::new();
+    go(&mut frames, false, 4, over, deep);
+    go(&mut frames, false, 6, deep, deep);
+    frames[6].operations.push(Operation::Stiffen {
+        at: site.place(0.0, 0.0, -4.0),
+        radius: 10.0,
+        factor: 4.0,
+    });
+    go(&mut frames, false, 8, deep, deep);
+    frames
+}
