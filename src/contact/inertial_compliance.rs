@@ -3,7 +3,8 @@
 
 use ::contact::Rows;
 
-use super::compliance::{Compliance, Delassus, WHAT};
+use super::compliance::{Compliance, WHAT};
+use super::delassus::Delassus;
 use super::ties::Points;
 use crate::error::Result;
 use crate::kernels::Isa;

@@ -6,7 +6,8 @@
 //! | [`tool`] | what a host gives: shape, pose, how it holds; and what it gets back |
 //! | [`past`] | what is remembered from step to step: poses, forces, grasps |
 //! | `buried` | tools that lie in the tissue, and their way out |
-//! | [`compliance`] | how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
+//! | [`compliance`] | which compliance `A` a contact has |
+//! | `column_compliance`, `delassus` | `A` at the columns that samples touch, and how samples move under forces on samples: the Delassus matrix `W = B A B^T` |
 //! | `inertial_compliance` | the same at any time after a step |
 //! | [`ties`] | springs from the tissue to something else, rows beside those of tools |
 //! | [`state`] | where the tissue is, and where it was |
@@ -18,7 +19,9 @@
 //! REQ-041: A pressed tool leaves no penetration, feels a force back, and none once it is lifted.
 
 mod buried;
+mod column_compliance;
 pub mod compliance;
+mod delassus;
 mod inertial_compliance;
 pub mod past;
 pub mod problem;
@@ -28,8 +31,8 @@ mod stored;
 pub mod ties;
 pub mod tool;
 
-pub(crate) use compliance::Delassus;
 pub use compliance::{Compliance, Tangent};
+pub(crate) use delassus::Delassus;
 pub use past::{Force, Past};
 pub use problem::ContactProblem;
 pub(crate) use rows::{Pair, outward};

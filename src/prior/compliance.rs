@@ -64,8 +64,19 @@ fn widen(from: &Numbers, start: usize, out: &mut [f32]) {
     }
 }
 
+/// `a . b`, in so many sums at once that no processor waits for one.
 fn dot(a: &[f32], b: &[f32]) -> f32 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    const LANES: usize = 8;
+    let (wide_a, rest_a) = a.as_chunks::<LANES>();
+    let (wide_b, rest_b) = b[..a.len()].as_chunks::<LANES>();
+    let mut lanes = [0.0f32; LANES];
+    for (a, b) in wide_a.iter().zip(wide_b) {
+        for ((sum, a), b) in lanes.iter_mut().zip(a).zip(b) {
+            *sum += a * b;
+        }
+    }
+    let rest: f32 = rest_a.iter().zip(rest_b).map(|(a, b)| a * b).sum();
+    lanes.iter().sum::<f32>() + rest
 }
 
 impl Compliance {
@@ -132,12 +143,12 @@ impl Compliance {
     }
 
     /// As [`Compliance::gather`], with columns behind the table's own.
-    pub fn gather_borrowed(
+    pub fn gather_borrowed<T: From<f32>>(
         &self,
         bases: Bases<'_>,
         borrowed: Borrowed<'_>,
-        columns: &[u32],
-        upper: &mut [f64],
+        (columns, known): (&[u32], &[bool]),
+        upper: &mut [T],
         scratch: &mut Vec<f32>,
     ) {
         let order = 3 * columns.len();
@@ -151,6 +162,9 @@ impl Compliance {
         };
         for (i, &column) in columns.iter().enumerate() {
             for (j, &other) in columns.iter().enumerate().skip(i) {
+                if are_known(known, i, j) {
+                    continue;
+                }
                 let (row, across) = (source(column), source(other));
                 let block = match self {
                     Compliance::Whole(whole) => std::array::from_fn(|at| {
@@ -169,20 +183,21 @@ impl Compliance {
                     }
                 };
                 for (at, &value) in block.iter().enumerate() {
-                    upper[(3 * i + at / 3) * order + 3 * j + at % 3] = f64::from(value);
+                    upper[(3 * i + at / 3) * order + 3 * j + at % 3] = T::from(value);
                 }
             }
         }
     }
 
-    /// Writes the upper triangle of the block of contact nodes `columns` (ascending), `[3m,3m]` row-major, into `upper`.
+    /// Writes the upper triangle of the block of contact nodes `columns` (ascending), `[3m,3m]` row-major, into `upper`; where two columns
+    /// are both `known` it leaves what is there. No list of them: none is.
     ///
     /// `scratch` is kept between calls and grows to six rows of the widest block's rank.
-    pub fn gather(
+    pub fn gather<T: From<f32>>(
         &self,
         bases: Bases<'_>,
-        columns: &[u32],
-        upper: &mut [f64],
+        (columns, known): (&[u32], &[bool]),
+        upper: &mut [T],
         scratch: &mut Vec<f32>,
     ) {
         let order = 3 * columns.len();
@@ -193,18 +208,26 @@ impl Compliance {
                     for axis in 0..3 {
                         let from = &whole[(3 * node as usize + axis) * n..][..n];
                         let to = &mut upper[(3 * i + axis) * order..][..order];
-                        for (to, &other) in to.chunks_exact_mut(3).zip(columns).skip(i) {
+                        let blocks = to.chunks_exact_mut(3).zip(columns).enumerate();
+                        for (j, (to, &other)) in blocks.skip(i) {
+                            if are_known(known, i, j) {
+                                continue;
+                            }
                             let from = &from[3 * other as usize..][..3];
-                            to[0] = f64::from(from[0]);
-                            to[1] = f64::from(from[1]);
-                            to[2] = f64::from(from[2]);
+                            to[0] = T::from(from[0]);
+                            to[1] = T::from(from[1]);
+                            to[2] = T::from(from[2]);
                         }
                     }
                 }
             }
-            Compliance::Near(near) => near.gather(bases, columns, upper, scratch),
+            Compliance::Near(near) => near.gather(bases, (columns, known), upper, scratch),
         }
     }
+}
+
+fn are_known(known: &[bool], i: usize, j: usize) -> bool {
+    !known.is_empty() && known[i] && known[j]
 }
 
 /// `U_i response[j]`: of a node by where its rows and coordinates are, and of a column.
@@ -250,7 +273,13 @@ impl Near {
         })
     }
 
-    fn gather(&self, bases: Bases<'_>, columns: &[u32], upper: &mut [f64], scratch: &mut Vec<f32>) {
+    fn gather<T: From<f32>>(
+        &self,
+        bases: Bases<'_>,
+        (columns, known): (&[u32], &[bool]),
+        upper: &mut [T],
+        scratch: &mut Vec<f32>,
+    ) {
         let order = 3 * columns.len();
         for (i, &node) in columns.iter().enumerate() {
             let node = node as usize;
@@ -263,6 +292,9 @@ impl Near {
             let mut widened = false;
             let mut next = range.start;
             for (j, &other) in columns.iter().enumerate().skip(i) {
+                if are_known(known, i, j) {
+                    continue;
+                }
                 while next < range.end && self.nodes[next] < other {
                     next += 1;
                 }
@@ -285,7 +317,7 @@ impl Near {
                     }
                 }
                 for (at, &value) in block.iter().enumerate() {
-                    upper[(3 * i + at / 3) * order + 3 * j + at % 3] = f64::from(value);
+                    upper[(3 * i + at / 3) * order + 3 * j + at % 3] = T::from(value);
                 }
             }
         }
@@ -329,7 +361,7 @@ mod tests {
             };
             let columns = [0, 2, 3];
             let mut upper = vec![f64::NAN; 81];
-            near().gather(bases, &columns, &mut upper, &mut Vec::new());
+            near().gather(bases, (&columns, &[]), &mut upper, &mut Vec::new());
             assert_eq!((upper[0], upper[1], upper[10]), (4.0, 0.125, 4.0));
             assert_eq!(upper[3 * 9 + 6], 3.0, "nodes 2 and 3");
             for (axis, other) in [(0, 1), (2, 2)] {

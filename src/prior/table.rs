@@ -59,6 +59,16 @@ impl PriorTable {
     /// Writes the upper triangle of the compliance of `columns` (indices into `contact_nodes`, ascending) with themselves,
     /// `[3m,3m]`, mm/mN. `scratch` is kept between calls.
     pub fn gather_compliance(&self, columns: &[u32], upper: &mut [f64], scratch: &mut Vec<f32>) {
+        self.gather_new_compliance((columns, &[]), upper, scratch);
+    }
+
+    /// The same without the blocks of two columns that are both `known`, which stay as they are.
+    pub fn gather_new_compliance<T: From<f32>>(
+        &self,
+        columns: (&[u32], &[bool]),
+        upper: &mut [T],
+        scratch: &mut Vec<f32>,
+    ) {
         let bases = Bases {
             basis: &self.basis,
             response: &self.response,

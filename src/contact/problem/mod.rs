@@ -24,12 +24,12 @@ pub use solve::Change;
 use tie_set::TieSet;
 
 use super::buried::{Buried, Sides};
-use super::compliance::Delassus;
+use super::delassus::Delassus;
 use super::inertial_compliance::InertialCompliance;
 use super::past::{Force, Held, Past};
 use super::rows::Row;
 use super::state::State;
-use super::ties::Placed;
+use super::ties::{NO_TOOL, Placed};
 use super::tool::{MAX_TOOLS, Mode, PUT_MM, Tool, ToolReading};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
@@ -38,7 +38,7 @@ use look::MOST_ROWS;
 use work::Work;
 
 const WHAT: &str = "the contact of instruments";
-/// Parts of a step's way at most: of a thin tool that goes as far as one may.
+/// Parts of a step's way at most.
 const MOST_PARTS: f32 = 80.0;
 /// Parts of the tools' ways in a step that has taken its time.
 const LEAST_PARTS: u32 = 4;
@@ -243,9 +243,7 @@ impl ContactProblem {
                 tools.len()
             )));
         }
-        for (index, tool) in tools.iter().enumerate() {
-            tool.check(index)?;
-        }
+        (tools.iter().enumerate()).try_for_each(|(index, tool)| tool.check(index))?;
         self.tools.clear();
         self.tools.extend_from_slice(tools);
         self.next.take(&self.past)?;
@@ -344,6 +342,16 @@ impl ContactProblem {
     /// Whether forces are at work in the step being made.
     pub fn has_forces(&self) -> bool {
         !self.next.forces.is_empty()
+    }
+
+    /// Whether tools pushed at the end of the last step.
+    pub fn tools_pushed(&self) -> bool {
+        self.past.forces.iter().any(|force| force.tool != NO_TOOL)
+    }
+
+    /// Whether tools push in the step being made.
+    pub fn tools_push(&self) -> bool {
+        self.next.forces.iter().any(|force| force.tool != NO_TOOL)
     }
 
     /// Whether a grasper holds a sample.

@@ -1,0 +1,195 @@
+//! How samples move under forces on samples: the Delassus matrix `W = B A B^T`.
+
+use ::contact::Vector;
+
+use super::column_compliance::ColumnCompliance;
+use super::compliance::{Compliance, WHAT};
+use super::ties::Points;
+use crate::error::Result;
+use crate::memory::{self, HeldBytes};
+
+/// A row's place among the columns, and its weight there, for up to six nodes.
+#[derive(Clone, Copy, Debug, Default, HeldBytes)]
+struct Entries {
+    count: usize,
+    places: [(u32, f32); 6],
+}
+
+/// `A` at some columns, and `W` of samples on them. From call to call only what is new is computed: each value is a function of its
+/// two columns, or samples, alone, so what was kept has the bits of what would be made anew.
+#[derive(Debug, Default, HeldBytes)]
+pub struct Delassus {
+    /// `A` at the columns that the samples touch.
+    at: ColumnCompliance,
+    /// `W = B A B^T [3n,3n]`, mm/mN, and the samples whose rows `B` it is made of.
+    w: Vec<f32>,
+    of: Vec<u32>,
+    /// `W` and its samples in the call before.
+    w_before: Vec<f32>,
+    of_before: Vec<u32>,
+    /// Samples of the call before, ascending, and their rows there; by sample, its row there or [`NONE`].
+    known: Vec<(u32, u32)>,
+    was: Vec<u32>,
+    /// By sample: its places among the columns.
+    entries: Vec<Entries>,
+    /// `B A` of one sample `[3,3m]`.
+    line: Vec<f32>,
+    /// The rows by their samples' numbers.
+    order: Vec<u32>,
+    /// Of which ties.
+    ties: u64,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Delassus {
+    /// `W` of samples, `[3n,3n]`, row-major; read again only where they are others than those of the last call.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn of<'p>(
+        &mut self,
+        compliance: Compliance<'_>,
+        all: impl Into<Points<'p>>,
+        rows: &[u32],
+    ) -> Result<&[f32]> {
+        self.read(compliance, all.into(), rows)?;
+        Ok(&self.w)
+    }
+
+    /// The same, and whether it is other than that of the last call.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn fixed(
+        &mut self,
+        compliance: Compliance<'_>,
+        all: Points<'_>,
+        rows: &[u32],
+    ) -> Result<(&[f32], bool)> {
+        let is_new = self.read(compliance, all, rows)?;
+        Ok((&self.w, is_new))
+    }
+
+    /// Makes `w` that of the samples; says whether it was another's.
+    fn read(&mut self, compliance: Compliance<'_>, all: Points<'_>, rows: &[u32]) -> Result<bool> {
+        if self.ties != all.generation {
+            // Rows of the same numbers are others.
+            self.of.clear();
+            self.w.clear();
+            self.ties = all.generation;
+        }
+        let samples = rows.iter().map(|row| all.at(*row));
+        let is_other = self.at.gather(compliance, rows.len(), samples.clone());
+        if !matches!(is_other, Ok(false)) {
+            self.of.clear();
+            self.w.clear();
+        }
+        is_other?;
+        if self.of == rows {
+            return Ok(false);
+        }
+        let count = rows.len();
+        std::mem::swap(&mut self.w, &mut self.w_before);
+        std::mem::swap(&mut self.of, &mut self.of_before);
+        self.of.clear();
+        self.w.clear();
+        self.known.clear();
+        self.entries.clear();
+        memory::fit(&mut self.known, self.of_before.len(), WHAT)?;
+        memory::fit(&mut self.entries, count, WHAT)?;
+        memory::fit(&mut self.of, count, WHAT)?;
+        memory::fit(&mut self.w, 9 * count * count, WHAT)?;
+        memory::fit(&mut self.order, count, WHAT)?;
+        memory::fit(&mut self.was, count, WHAT)?;
+        memory::fit(&mut self.line, 3 * self.at.order(), WHAT)?;
+        let before = self.of_before.iter().enumerate();
+        self.known
+            .extend(before.map(|(at, &sample)| (sample, at as u32)));
+        self.known.sort_unstable();
+        self.w.resize(9 * count * count, 0.0);
+        self.of.extend_from_slice(rows);
+        for sample in samples {
+            let mut entries = Entries::default();
+            for (column, weight) in compliance.entries(sample) {
+                let place = self.at.row_of(column) as u32;
+                entries.places[entries.count] = (place, weight);
+                entries.count += 1;
+            }
+            self.entries.push(entries);
+        }
+        self.order.clear();
+        self.order.extend(0..count as u32);
+        self.order.sort_unstable_by_key(|at| rows[*at as usize]);
+        self.was.clear();
+        let known = &self.known;
+        self.was.extend(rows.iter().map(|sample| {
+            let found = known.binary_search_by_key(sample, |known| known.0);
+            found.map_or(NONE, |found| known[found].1)
+        }));
+        for first in 0..count {
+            self.fill_rows(first);
+        }
+        Ok(true)
+    }
+
+    /// Blocks of `W` of the sample at `first` in the order of their numbers with itself and those after it: each is summed from the lower one of
+    /// two samples, so that it does not depend on the order of the rows.
+    fn fill_rows(&mut self, first: usize) {
+        let count = self.of.len();
+        let (size, size_before) = (3 * count, 3 * self.of_before.len());
+        let i = self.order[first] as usize;
+        let was_i = self.was[i] as usize;
+        self.line.clear();
+        for at in first..count {
+            let j = self.order[at] as usize;
+            let was_j = self.was[j] as usize;
+            let mut block = [[0.0f32; 3]; 3];
+            if self.was[i] != NONE && self.was[j] != NONE {
+                for (axis, row) in block.iter_mut().enumerate() {
+                    let from = (3 * was_i + axis) * size_before + 3 * was_j;
+                    row.copy_from_slice(&self.w_before[from..from + 3]);
+                }
+            } else {
+                self.add_block(i, j, &mut block);
+            }
+            if i == j {
+                block[0] = [block[0][0], block[1][0], block[2][0]];
+                block[1][2] = block[2][1];
+            }
+            for (axis, values) in block.iter().enumerate() {
+                self.w[(3 * i + axis) * size + 3 * j..][..3].copy_from_slice(values);
+                let turned = block.map(|row| row[axis]);
+                self.w[(3 * j + axis) * size + 3 * i..][..3].copy_from_slice(&turned);
+            }
+        }
+    }
+
+    /// Adds the block of the sample at `i`, whose `line` is made where it is not, with that at `j`.
+    fn add_block(&mut self, i: usize, j: usize, block: &mut [[f32; 3]; 3]) {
+        let order = self.at.order();
+        let (row, other) = (self.entries[i], self.entries[j]);
+        if self.line.is_empty() {
+            self.line.resize(3 * order, 0.0);
+            for (from, x) in &row.places[..row.count] {
+                let lines = self.at.rows(*from as usize, 3);
+                for (sum, value) in self.line.iter_mut().zip(lines) {
+                    *sum += x * value;
+                }
+            }
+        }
+        for (to, y) in &other.places[..other.count] {
+            for (axis, row) in block.iter_mut().enumerate() {
+                let values = &self.line[axis * order + *to as usize..][..3];
+                for (sum, value) in row.iter_mut().zip(values) {
+                    *sum += y * value;
+                }
+            }
+        }
+    }
+
+    /// What forces on degrees of freedom of the columns do to the node of one of them, mm.
+    pub fn moved(&self, column: u32, dofs: &[u32], forces: &[f32]) -> Vector {
+        self.at.moved(column, dofs, forces)
+    }
+}
