@@ -20,6 +20,8 @@ const RECOVERY_MM: f32 = 3.0;
 const SHALLOW_MM: f32 = 0.5;
 /// ... nor one from which the way back through the tool is more than this many times its depth: that way grazes the tool's side.
 const LONG_WAY: f32 = 4.0;
+/// A way that comes no nearer than this to the box around a tool does not graze it, mm.
+const GRAZED_MM: f32 = 0.1;
 /// A force this near (cosine) to the normal of a broad tool's nearest face comes from there, friction and all.
 const SAME_FACE: f32 = 0.7;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
@@ -196,6 +198,29 @@ impl Pair<'_> {
         let back = way.try_normalize()?;
         let length = way.length() + SHALLOW_MM;
         Some((back, self.body.way_through(self.now, point, back, length)?))
+    }
+
+    /// Whether a sample that is clear of the tool and not pushed may be in contact with it: the tool lies in the tissue, or the way back from the sample to
+    /// where it was, as the tool sees it, crosses the box around the tool.
+    pub(super) fn may_reach(&self, point: Vector, start: Vector) -> bool {
+        if self.way_out.is_some() {
+            return true;
+        }
+        if !self.swept {
+            return false;
+        }
+        let [now, then] = [(self.now, point), (self.from, start)]
+            .map(|(pose, point)| pose.inverse_transform_point(point));
+        let way = then - now;
+        let back = way + way.normalize_or_zero() * SHALLOW_MM;
+        let (low, high) = self.body.bounds(&Pose::IDENTITY, GRAZED_MM);
+        // The parts of the way that are between the two planes of each axis.
+        let [from, to] = [low, high].map(|side| (side - now) / back);
+        let enters = from.min(to).max_element();
+        let leaves = from.max(to).min_element();
+        // Along an axis, or where the way has no length, nothing is known.
+        let is_known = enters.is_finite() && leaves.is_finite();
+        !is_known || (enters <= leaves && enters <= 1.0 && leaves >= 0.0)
     }
 
     /// Whether a sample may have come `way` into the tool since it was at `start`, or lay in it already.

@@ -4,7 +4,7 @@ use ::contact::{Placed, SKIN_MM, SPACING_MM, Vector, pose};
 
 use super::{ContactProblem, WHAT};
 use crate::contact::buried::Buried;
-use crate::contact::rows::{Moving, Row, outward};
+use crate::contact::rows::{Moving, Pair, Row, outward};
 use crate::contact::state::State;
 use crate::contact::ties::NO_TOOL;
 use crate::contact::tool::MAX_TOOLS;
@@ -66,10 +66,27 @@ impl ContactProblem {
             self.found += found.len();
             let anchors = self.next.tools[index].grasp.anchors();
             memory::reserve(&mut self.rows, found.len() + anchors.len() + 1, WHAT)?;
-            let found = found
-                .iter()
-                .map(|c| row(tool, c.sample, Vector::ZERO, c.distance > SKIN_MM));
-            self.rows.extend(found);
+            let pair = Pair {
+                body: placed.body,
+                friction: 0.0,
+                from: &self.before[index],
+                now: &placed.pose,
+                anchor: None,
+                put: self.put[index],
+                swept: self.swept[index],
+                way_out: self.buried[index].map(|buried| buried.out),
+            };
+            let samples = &self.samples;
+            let found = found.iter().filter(|found| {
+                let start = || {
+                    samples
+                        .at(found.sample)
+                        .gather(|node| state.position_before(node))
+                };
+                wide || found.distance <= SKIN_MM || pair.may_reach(found.point, start())
+            });
+            self.rows
+                .extend(found.map(|c| row(tool, c.sample, Vector::ZERO, c.distance > SKIN_MM)));
             let own = anchors.iter().map(|anchor| anchor.sample);
             let own = own.chain(self.buried[index].map(|buried| buried.row));
             self.rows
