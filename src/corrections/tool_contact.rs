@@ -17,6 +17,7 @@
 mod fall_back;
 mod freely;
 mod recover;
+mod remake;
 mod rounds;
 mod whole;
 
@@ -40,11 +41,6 @@ const MORE_PRESSES: u32 = 6;
 const MORE_EVALUATIONS: u32 = 6;
 const EVALUATIONS: u32 = 2;
 
-/// Where broad tools stop that thrust farther than the step can follow, in half thicknesses from where they were.
-const STOPS: [f32; 2] = [0.8, 0.0];
-
-/// How often a step is made again because ties break; what is pulled too hard then breaks in the next.
-const MOST_BREAKS: u32 = 6;
 /// Parts of the tools' way after which a guess that inverts elements is improved by an iteration, at most.
 const MOST_PARTS: u32 = 4;
 
@@ -60,64 +56,7 @@ struct Iterate<'a> {
 }
 
 impl ImplicitSolver {
-    /// Makes the step from `input.last` that the tools of `problem` cause, and tells them what they feel.
-    pub(super) fn correct_loaded(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        next: &mut [f32],
-    ) -> Result<Report> {
-        self.make_loaded(context, input, problem, next, true)
-    }
-
-    /// The same with the pairs of the last published state, or with those that there are; once more where a grasp tears off, which then holds nothing at the end,
-    /// and where ties break.
-    pub(super) fn make_loaded(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        next: &mut [f32],
-        from_published: bool,
-    ) -> Result<Report> {
-        let _awake = context.pool.keep_awake();
-        let mut made = |problem: &mut ContactProblem, breaks: bool| -> Result<Report> {
-            if from_published {
-                self.begin_pairs();
-            }
-            let report = self.balance_loaded(context, input, problem, next)?;
-            let state = State {
-                rest: input.rest,
-                u: next,
-                start: input.last,
-            };
-            problem.finish_with(state, breaks);
-            Ok(report)
-        };
-        let mut report = made(problem, true)?;
-        // Tools that no single step follows stop on their way, at last where they were.
-        for thicknesses in STOPS {
-            if !(problem.is_thrust() && (report.fell_back || problem.has_passed())) {
-                break;
-            }
-            problem.stop_after(thicknesses);
-            problem.work.renew();
-            report = made(problem, true)?;
-        }
-        if problem.tears() {
-            report = made(problem, true)?;
-        }
-        // Each time those break that bear least of what they are pulled with.
-        let mut left = MOST_BREAKS;
-        while problem.has_broken() {
-            left -= 1;
-            report = made(problem, left > 0)?;
-        }
-        problem.tell_lag();
-        Ok(report)
-    }
-
+    /// One step with the tools where they are.
     fn balance_loaded(
         &mut self,
         context: SolverContext<'_>,
@@ -361,14 +300,18 @@ pub(super) fn is_spent(
     report.evaluations >= most
 }
 
-/// How deep tissue `u` and the tools lie in each other, at part `way` of their way, mm.
-fn sunk(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) -> f32 {
-    let state = State {
+/// Tissue `u` in the step.
+fn state<'a>(input: &Input<'a>, u: &'a [f32]) -> State<'a> {
+    State {
         rest: input.rest,
         u,
         start: input.last,
-    };
-    problem.sunk(state, way)
+    }
+}
+
+/// How deep tissue `u` and the tools lie in each other, at part `way` of their way, mm.
+fn sunk(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) -> f32 {
+    problem.sunk(state(input, u), way)
 }
 
 /// How deep tools and tissue lie in each other in a state of linear elasticity; without bounds where that goes too far.

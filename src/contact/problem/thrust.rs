@@ -7,20 +7,19 @@ use super::ContactProblem;
 use crate::contact::past::Force;
 
 impl ContactProblem {
+    /// Whether the contact of a broad tool was lost that goes quickly on into tissue which it pushed when the step began: it touches nothing any more, or the
+    /// step `fell_back`, which beside a tool that was put elsewhere says nothing of it.
+    pub fn has_passed(&self, fell_back: bool) -> bool {
+        let fell_back = fell_back && !self.has_leapt;
+        (0..self.tools.len()).any(|index| self.thrusts(index) && (fell_back || !self.pushes(index)))
+    }
+
+    fn pushes(&self, index: usize) -> bool {
+        let mut forces = self.next.forces.iter();
+        forces.any(|force| force.tool == index as u32)
+    }
+
     /// Whether a broad tool goes quickly on into tissue that it pushed when the step began.
-    pub fn is_thrust(&self) -> bool {
-        (0..self.tools.len()).any(|index| self.thrusts(index))
-    }
-
-    /// Whether such a tool touches nothing any more.
-    pub fn has_passed(&self) -> bool {
-        let pushes = |index: usize| {
-            let mut forces = self.next.forces.iter();
-            forces.any(|force| force.tool == index as u32)
-        };
-        (0..self.tools.len()).any(|index| self.thrusts(index) && !pushes(index))
-    }
-
     fn thrusts(&self, index: usize) -> bool {
         if !self.swept[index] || !self.tools[index].body.is_broad() {
             return false;

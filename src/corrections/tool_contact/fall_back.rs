@@ -31,7 +31,7 @@ impl ImplicitSolver {
             self.respond_from_rest(context, input, problem, at, report)?;
             let from_rest = self.press_on(context, input, problem, SUNK_MM, at.u)?;
             // No force at all: the tool lies where samples cannot see it, and the tissue is where no tool pushed it.
-            let is_lost = problem.had_forces() && !problem.has_forces();
+            let is_lost = problem.tools_pushed() && !problem.tools_push();
             if from_rest < left && !is_lost {
                 left = from_rest;
                 self.keep(problem, at)?;

@@ -54,7 +54,9 @@ impl ImplicitSolver {
             self.improve_round(context, input, problem, at, (&mut made, report))?;
             self.end_round(context, input, problem, at, report)?;
             let most = input.enough.iterations;
-            if made.is_enough || made.iterations >= most || problem.work.is_spent() {
+            // A tool that was put elsewhere comes out of the tissue over a few steps: none of them is worth another base.
+            let is_last = made.iterations >= most || problem.has_leapt();
+            if made.is_enough || is_last || problem.work.is_spent() {
                 break;
             }
             self.evaluate(context, input, at, report)?;
