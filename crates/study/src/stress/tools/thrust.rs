@@ -94,7 +94,7 @@ fn top(hands: &mut Hands, blade: &Tool, site: &Site) -> Result<f32> {
 struct Pressed {
     /// mN.
     force: f64,
-    /// Steps in the tissue without contact and without a flag.
+    /// Steps with tissue in the blade, without contact and without a flag.
     silent: usize,
 }
 
@@ -118,14 +118,16 @@ fn press(
         force: 0.0,
         silent: 0,
     };
+    let body = [Body::new(&blade.shape)?];
     for depth in depths {
-        let made = hands
-            .driver
-            .step(&[at(blade, site, top + depth)?], &mut hands.field)?;
+        let pose = at(blade, site, top + depth)?;
+        let made = hands.driver.step(&[pose], &mut hands.field)?;
         let felt = &made.felt[0];
         pressed.force = Vector::from(felt.force.map(|x| x as f32)).length().into();
         let told = made.flags & (flag::DEEP | flag::UNSOLVED) != 0;
-        pressed.silent += usize::from(depth > 1.0 && felt.contacts == 0 && !told);
+        let is_silent = depth > 1.0 && felt.contacts == 0 && !told;
+        let lies_in = || hands.yard.penetration(&hands.field, &body, &[pose.pose]) > CLEAR_MM;
+        pressed.silent += usize::from(is_silent && lies_in());
     }
     Ok(pressed)
 }
