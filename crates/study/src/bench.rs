@@ -66,7 +66,7 @@ impl Run {
 }
 
 pub(crate) fn names(flags: u32) -> String {
-    const NAMES: [(u32, &str); 15] = [
+    const NAMES: [(u32, &str); 16] = [
         (flag::PUSH, "push"),
         (flag::CONTACT_AREA, "area"),
         (flag::SITE, "site"),

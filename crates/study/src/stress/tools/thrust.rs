@@ -126,7 +126,7 @@ fn press(
         pressed.force = Vector::from(felt.force.map(|x| x as f32)).length().into();
         let told = made.flags & (flag::DEEP | flag::UNSOLVED) != 0;
         let is_silent = depth > 1.0 && felt.contacts == 0 && !told;
-        let lies_in = || hands.yard.penetration(&hands.field, &body, &[pose.pose]) > CLEAR_MM;
+        let mut lies_in = || hands.yard.penetration(&hands.field, &body, &[pose.pose]) > CLEAR_MM;
         pressed.silent += usize::from(is_silent && lies_in());
     }
     Ok(pressed)
