@@ -16,7 +16,7 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         let env = context.env();
         let _awake = context.pool.keep_awake();
-        self.remember(context, input)?;
+        self.remember(context, input, false)?;
         let held = &env.held.is;
         let forces = 3 * input.contact.len();
         memory::fit(&mut self.next.reaction, forces, "contact forces")?;

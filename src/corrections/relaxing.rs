@@ -23,8 +23,9 @@ pub(super) struct Relaxing {
     pub(super) since_s: f64,
     pub(super) next_since_s: f64,
     pub(super) next_is_new: bool,
-    /// Whether `pushes` are those of the step from the last published state.
+    /// Whether `pushes` are those of the step from the last published state: the one at its end, and the one at its start.
     pub(super) is_ready: bool,
+    pub(super) has_start: bool,
     /// What it pushes with at the start and the end of the scene's step `[K,3]`, µN.
     pub(super) pushes: [Vec<f32>; 2],
 }
@@ -46,6 +47,7 @@ impl Relaxing {
             next_since_s: 0.0,
             next_is_new: false,
             is_ready: false,
+            has_start: false,
             pushes: [push()?, push()?],
         };
         Ok(Some(memory::boxed(own, WHAT)?))
@@ -76,6 +78,11 @@ impl Relaxing {
     /// Adds what it pushes with at a part of the scene's step.
     pub(super) fn add(&self, way: f32, out: &mut [f32]) {
         let [from, to] = &self.pushes;
+        if way == 1.0 {
+            out.iter_mut().zip(to).for_each(|(out, to)| *out += to);
+            return;
+        }
+        debug_assert!(self.has_start, "asked for at a part of a step");
         for ((out, from), to) in out.iter_mut().zip(from).zip(to) {
             *out += from + way * (to - from);
         }

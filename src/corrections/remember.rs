@@ -12,11 +12,17 @@ use crate::memory;
 const WHAT: &str = "the stresses of a cut body";
 
 impl ImplicitSolver {
-    /// Before a step of the scene: what is remembered goes on to the last published state, and what it pushes with until the end of the step is known.
+    /// Before a step of the scene: what is remembered goes on to the last published state, and what it pushes with at the end of the step is known; with
+    /// `start` at its start too, for what happens within it.
     ///
     /// # Errors
     /// A panic on another thread of the pool.
-    pub(super) fn remember(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<()> {
+    pub(super) fn remember(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        start: bool,
+    ) -> Result<()> {
         let Some(own) = &mut self.relaxing else {
             return Ok(());
         };
@@ -24,18 +30,19 @@ impl ImplicitSolver {
         own.next_since_s = step_s;
         own.next_is_new = input.still;
         if input.still {
-            own.is_ready = false;
+            (own.is_ready, own.has_start) = (false, true);
             own.pushes.iter_mut().for_each(|push| push.fill(0.0));
             return Ok(());
         }
         // A step that is made a second time, with other contact or none.
-        if std::mem::replace(&mut own.is_ready, true) {
+        if own.is_ready && (own.has_start || !start) {
             return Ok(());
         }
+        (own.is_ready, own.has_start) = (true, start);
         let forces = &context.corrections.body.forces;
         let relaxation = forces.relaxation();
         let g0 = relaxation.over(context.corrections.time_step.integrator.step_s);
-        let step = StressStep::new(relaxation, own.since_s, [0.0, step_s], g0);
+        let step = StressStep::new(relaxation, own.since_s, [step_s, 0.0], g0);
         let [from, to] = &mut own.pushes;
         let failed = std::sync::Mutex::new(None);
         forces.relax(
@@ -43,7 +50,7 @@ impl ImplicitSolver {
             &mut own.history,
             &step,
             &mut self.scratch,
-            [from, to],
+            (to, start.then_some(from)),
             &|count, task| {
                 if let Err(error) = context.pool.run(count, task) {
                     *failed

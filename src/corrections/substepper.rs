@@ -160,7 +160,7 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         self.begin_pairs();
         let _awake = self.relaxes().then(|| context.pool.keep_awake());
-        self.remember(context, input)?;
+        self.remember(context, input, true)?;
         let enough = Enough {
             iterations: input.enough.iterations.max(LEAST_SWING),
             ..input.enough

@@ -77,7 +77,7 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         problem.work.end_by(input.enough.until);
         let _awake = context.pool.keep_awake();
-        self.remember(context, input)?;
+        self.remember(context, input, false)?;
         let Some((substeps, substepper)) = substeps else {
             return self.correct_loaded(context, input, problem, next);
         };
@@ -104,6 +104,7 @@ impl ImplicitSolver {
         (substeps, substepper): (&mut Substeps, &mut Substepper),
         next: &mut [f32],
     ) -> Result<Report> {
+        self.remember(context, input, true)?;
         substepper.start(
             &self.motion,
             input,

@@ -143,9 +143,16 @@ unsafe fn all_histories<L: NodeLanes>(
         let of_octahedra = of_octahedra.add(chunk.octahedra.start * 4 * batch);
         let of_pairs = of_pairs.add(chunk.pairs.start * 2 * batch);
         let of_singles = of_singles.add(chunk.singles.start * batch);
-        relax::<L, 6, 4>(law, step, (octahedra, a), of_octahedra, nodes, forces);
-        relax::<L, 5, 2>(law, step, (pairs, b), of_pairs, nodes, forces);
-        relax::<L, 4, 1>(law, step, (singles, c), of_singles, nodes, forces);
+        let (octahedra, pairs, singles) = ((octahedra, a), (pairs, b), (singles, c));
+        if forces[1].is_null() {
+            relax::<L, 6, 4, 1>(law, step, octahedra, of_octahedra, nodes, forces);
+            relax::<L, 5, 2, 1>(law, step, pairs, of_pairs, nodes, forces);
+            relax::<L, 4, 1, 1>(law, step, singles, of_singles, nodes, forces);
+        } else {
+            relax::<L, 6, 4, 2>(law, step, octahedra, of_octahedra, nodes, forces);
+            relax::<L, 5, 2, 2>(law, step, pairs, of_pairs, nodes, forces);
+            relax::<L, 4, 1, 2>(law, step, singles, of_singles, nodes, forces);
+        }
     }
 }
 

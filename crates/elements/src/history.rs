@@ -174,8 +174,8 @@ impl ElementForces {
         &self.partition.relaxation
     }
 
-    /// Takes the state `u` into the history and puts the two rows of forces that it pushes the nodes with (µN) to `out`, `[K,3]` each. Allocates nothing. The
-    /// bits do not depend on the number of threads.
+    /// Takes the state `u` into the history and puts the rows of forces that it pushes the nodes with (µN) to `first` and, where it is asked for, `second`,
+    /// `[K,3]` each. Allocates nothing. The bits do not depend on the number of threads.
     ///
     /// # Panics
     /// If a length is not `3 K`, or for the history of another body.
@@ -185,19 +185,21 @@ impl ElementForces {
         history: &mut StressHistory,
         step: &StressStep,
         scratch: &mut Scratch,
-        out: [&mut [f32]; 2],
+        (first, second): (&mut [f32], Option<&mut [f32]>),
         parallel: ParallelFor<'_>,
     ) {
         assert_eq!(displacement.len(), 3 * self.node_count(), "displacement");
+        let mut out = [Some(first), second];
         assert!(
-            out.iter().all(|row| row.len() == 3 * self.node_count()),
+            (out.iter().flatten()).all(|row| row.len() == 3 * self.node_count()),
             "out"
         );
+        let count = out.iter().flatten().count();
         assert_eq!(history.branches, step.count, "branches");
         let partition = &self.partition;
         let values = history.pointers().map(Shared);
-        let second = history.second.as_mut_ptr();
-        let rows = [scratch.forces.as_mut_ptr(), second].map(|row| Shared(row.cast::<[f32; 4]>()));
+        let other = history.second.as_mut_ptr();
+        let rows = [scratch.forces.as_mut_ptr(), other].map(|row| Shared(row.cast::<[f32; 4]>()));
         let places = Shared(scratch.positions.as_mut_ptr());
         let chunks = &partition.chunks;
         parallel(chunks.len(), &|index, worker| {
@@ -210,20 +212,26 @@ impl ElementForces {
                     let u = &displacement[3 * node as usize..][..3];
                     *places.add(at) = [u[0], u[1], u[2], 0.0];
                 }
-                let forces = [0, 1].map(|side: usize| rows[side].at(chunk.first));
-                for row in forces {
-                    std::ptr::write_bytes(row, 0, chunk.slot_count());
+                let mut forces = [std::ptr::null_mut(); 2];
+                for (row, all) in forces.iter_mut().zip(&rows[..count]) {
+                    *row = all.at(chunk.first);
+                    std::ptr::write_bytes(*row, 0, chunk.slot_count());
                 }
                 let values = [0, 1, 2].map(|kind: usize| values[kind].at(0));
                 (self.kernels.relax)(partition, chunk, step, values, places, forces);
             }
         });
-        let out = out.map(|row| Shared(row.as_mut_ptr().cast::<[f32; 3]>()));
+        let out = (out.each_mut()).map(|row| {
+            let start = row
+                .as_mut()
+                .map_or(std::ptr::null_mut(), |row| row.as_mut_ptr());
+            Shared(start.cast::<[f32; 3]>())
+        });
         parallel(chunks.len(), &|index, _| {
             let chunk = &chunks[index];
             // SAFETY: own slots and own nodes are this chunk's; ghost slots are only read in this phase.
             unsafe {
-                for side in 0..2 {
+                for side in 0..count {
                     let row = &rows[side];
                     for (own, ghost) in &chunk.contributions {
                         let source = *row.at(*ghost as usize);

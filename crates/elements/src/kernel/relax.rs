@@ -44,9 +44,9 @@ fn ahead<T>(at: *const T, bytes: usize, lines: usize) {
     (0..lines).for_each(|line| lanes::prefetch(start.wrapping_add(LINE * line)));
 }
 
-/// Takes the stresses at displacements (mm) into the `history` of the clusters, and adds the forces (µN) of each row of weights that has `forces`.
+/// Takes the stresses at displacements (mm) into the `history` of the clusters, and adds the forces (µN) of the first `ROWS` rows of weights.
 #[inline(always)]
-pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize>(
+pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize, const ROWS: usize>(
     law: &LaneTerms,
     step: &StressStep,
     (clusters, gradients): (&[Cluster<NODES, TETS>], &[Gradients<TETS>]),
@@ -63,7 +63,7 @@ pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize>(
             ahead(cluster.slots.as_ptr(), size_of_val(cluster), NODES / 2 + 1);
             for first in (0..WIDTH).step_by(L::COUNT) {
                 let (edge, _) = edges::<L, NODES, TETS>(cluster, first, nodes);
-                let mut force = [[[zero; 3]; NODES]; 2];
+                let mut force = [[[zero; 3]; NODES]; ROWS];
                 for tet in 0..TETS {
                     let [a, b, c] = corners::<NODES>(tet);
                     let rows = &gradients.rows[tet];
@@ -79,13 +79,14 @@ pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize>(
                         ahead(rows.as_ptr(), size_of_val(gradients), rows.len());
                         ahead(&raw const gradients.volume[tet], size_of_val(gradients), 1);
                     }
-                    let mut sums = [[zero; SIX]; 2];
+                    let volume = zero.sub(load::<L>(&gradients.volume[tet], first));
+                    let mut sums = [[zero; SIX]; ROWS];
                     for k in 0..SIX {
                         let before = L::load(own.add(k * WIDTH));
                         let now = det.below(L::splat(SOUND_DET), before, now[k]);
                         now.store(own.add(k * WIDTH));
                         let change = now.sub(before);
-                        for side in 0..2 {
+                        for side in 0..ROWS {
                             sums[side][k] = now.mul(L::splat(step.weights[side][0]));
                         }
                         for branch in 0..step.count {
@@ -93,36 +94,38 @@ pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize>(
                             let kept = L::load(at).mul(L::splat(step.decay[branch]));
                             let q = change.mul_add(L::splat(step.gain[branch]), kept);
                             q.store(at);
-                            for side in 0..2 {
+                            for side in 0..ROWS {
                                 let weight = L::splat(step.weights[side][branch + 1]);
                                 sums[side][k] = q.mul_add(weight, sums[side][k]);
                             }
                         }
+                        for side in 0..ROWS {
+                            sums[side][k] = sums[side][k].mul(volume);
+                        }
                     }
-                    let volume = zero.sub(load::<L>(&gradients.volume[tet], first));
-                    for side in 0..2 {
-                        if forces[side].is_null() {
-                            continue;
+                    for side in 0..ROWS {
+                        let symmetric = |i: usize, j: usize| sums[side][PLACE[i][j]];
+                        let mut pushed = [[zero; 3]; 3];
+                        for i in 0..3 {
+                            for j in 0..3 {
+                                let along = [0, 1, 2].map(|k| symmetric(k, j));
+                                pushed[i][j] = symmetric(i, j).add(dot(h[i], along));
+                            }
                         }
                         for (corner, node) in [a, b, c].into_iter().enumerate() {
                             let g = [
-                                load::<L>(&rows[3 * corner], first).mul(volume),
-                                load::<L>(&rows[3 * corner + 1], first).mul(volume),
-                                load::<L>(&rows[3 * corner + 2], first).mul(volume),
+                                load::<L>(&rows[3 * corner], first),
+                                load::<L>(&rows[3 * corner + 1], first),
+                                load::<L>(&rows[3 * corner + 2], first),
                             ];
-                            let along = |i: usize| [0, 1, 2].map(|j| sums[side][PLACE[i][j]]);
-                            let pulled = [dot(along(0), g), dot(along(1), g), dot(along(2), g)];
                             for i in 0..3 {
-                                let both = pulled[i].add(dot(h[i], pulled));
-                                force[side][node][i] = force[side][node][i].add(both);
+                                let sum = &mut force[side][node][i];
+                                *sum = sum.add(dot(pushed[i], g));
                             }
                         }
                     }
                 }
-                for side in 0..2 {
-                    if forces[side].is_null() {
-                        continue;
-                    }
+                for side in 0..ROWS {
                     for node in 1..NODES {
                         for i in 0..3 {
                             force[side][0][i] = force[side][0][i].sub(force[side][node][i]);
