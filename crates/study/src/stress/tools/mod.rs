@@ -1,6 +1,7 @@
 //! The same suite driven by tools: their contact is solved in the step. Expected: bounded states, no element inside out
 //! without a flag, no tool that stays deep in the tissue without one, and tissue that comes back to rest.
 
+mod cut_rows;
 mod deep;
 mod hand;
 mod inputs;
@@ -50,6 +51,7 @@ pub fn sudden_rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
     let mut rows = sudden::rows(&mut hands)?;
     rows.extend(thrust::rows(&mut hands)?);
     rows.extend(deep::rows(bench, path)?);
+    rows.extend(cut_rows::rows(bench, path)?);
     Ok(rows)
 }
 
