@@ -1,8 +1,9 @@
 //! The kernels against their scalar references and against what one would write or call instead, at the sizes of
-//! K = 21,670. `cargo bench --bench kernels -- decoder` runs one group: decoder, encoder, table, contact, pool.
+//! K = 21,670. `cargo bench --bench kernels -- decoder` runs one group: decoder, encoder, table, leading, contact, pool.
 
 mod decoder;
 mod encoder;
+mod leading;
 #[path = "../measure/mod.rs"]
 mod measure;
 mod pool;
@@ -21,6 +22,9 @@ fn main() -> upt::Result<()> {
     }
     if measure::wanted("table") {
         reduced::tables();
+    }
+    if measure::wanted("leading") {
+        leading::against_whole()?;
     }
     if measure::wanted("contact") {
         reduced::contact();

@@ -314,10 +314,9 @@ impl Preconditioner {
 
     /// `at_contact = W^T r` of the columns in contact, from `coordinates = U^T r` and `on_modes = Phi^T r`.
     fn contact_work(&mut self, env: Env<'_>) -> Result<()> {
-        row_dots(
+        env.prior.response.dots(
             env.isa,
             env.pool,
-            env.prior.response.stored(),
             env.prior.stored_dofs(&self.dofs, &mut self.stored)?,
             &self.coordinates,
             &mut self.at_contact,

@@ -22,6 +22,7 @@ mod math;
 pub(crate) mod parts;
 pub mod pool;
 pub mod project;
+pub mod ragged;
 #[doc(hidden)]
 pub mod random;
 pub mod respond;

@@ -4,9 +4,8 @@
 //! neighbours only; what lies farther apart is smooth and comes out of the linear response itself, `A_ij = U_i response[j]` with
 //! the rows `U_i` of node `i` in the bases of its block (low rank).
 
-use half::slice::HalfFloatSliceExt;
-
 use super::numbers::Numbers;
+use super::response_table::Response;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
@@ -50,18 +49,9 @@ pub struct Bases<'a> {
     /// `U_k`, block after block.
     pub basis: &'a Numbers,
     /// `[3D,Q]`.
-    pub response: &'a Numbers,
+    pub response: &'a Response,
     /// `Q`.
     pub width: usize,
-}
-
-/// Widens `[start, start + out.len())` of `from`.
-fn widen(from: &Numbers, start: usize, out: &mut [f32]) {
-    let range = start..start + out.len();
-    match from {
-        Numbers::F32(values) => out.copy_from_slice(&values[range]),
-        Numbers::F16(values) => values[range].convert_to_f32_slice(out),
-    }
 }
 
 /// `a . b`, in so many sums at once that no processor waits for one.
@@ -242,13 +232,10 @@ fn far_block(
         scratch.resize(6 * rank, 0.0);
     }
     let (rows, forces) = scratch[..6 * rank].split_at_mut(3 * rank);
-    widen(bases.basis, row as usize, rows);
+    bases.basis.widen(row as usize, rows);
     for (axis, force) in forces.chunks_exact_mut(rank.max(1)).enumerate() {
-        widen(
-            bases.response,
-            (3 * other + axis) * bases.width + start,
-            force,
-        );
+        let row = 3 * other + axis;
+        bases.response.widen(row, bases.width, start, force);
     }
     std::array::from_fn(|at| {
         dot(
@@ -303,11 +290,11 @@ impl Near {
                     block = self.blocks[next];
                 } else {
                     if !std::mem::replace(&mut widened, true) {
-                        widen(bases.basis, self.rows[node] as usize, rows);
+                        bases.basis.widen(self.rows[node] as usize, rows);
                     }
                     for (axis, force) in forces.chunks_exact_mut(rank.max(1)).enumerate() {
-                        let row = (3 * other as usize + axis) * bases.width;
-                        widen(bases.response, row + start, force);
+                        let row = 3 * other as usize + axis;
+                        bases.response.widen(row, bases.width, start, force);
                     }
                     for (at, value) in block.iter_mut().enumerate() {
                         *value = dot(
@@ -354,9 +341,10 @@ mod tests {
     fn neighbours_are_stored_and_the_rest_comes_from_the_response() {
         for half in [false, true] {
             let (basis, response) = (numbers(96, half), numbers(12 * 16, half));
+            let whole = Response::Whole(response.clone());
             let bases = Bases {
                 basis: &basis,
-                response: &response,
+                response: &whole,
                 width: 16,
             };
             let columns = [0, 2, 3];

@@ -1,6 +1,7 @@
 //! A table's numbers at the width in which its file holds them.
 
 use half::f16;
+use half::slice::HalfFloatSliceExt;
 
 use crate::bundle::TensorFile;
 use crate::error::Result;
@@ -47,6 +48,15 @@ impl Numbers {
         match self {
             Numbers::F32(values) => Stored::F32(values),
             Numbers::F16(values) => Stored::F16(values),
+        }
+    }
+
+    /// Widens `[start, start + out.len())`.
+    pub(super) fn widen(&self, start: usize, out: &mut [f32]) {
+        let range = start..start + out.len();
+        match self {
+            Numbers::F32(values) => out.copy_from_slice(&values[range]),
+            Numbers::F16(values) => values[range].convert_to_f32_slice(out),
         }
     }
 

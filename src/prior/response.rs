@@ -142,7 +142,12 @@ impl ContactResponse {
 
     /// The field of the last solve in block coordinates, `q = sum_i f_i response[i]`.
     pub fn field(&self, isa: Isa, pool: &Pool, table: &PriorTable, q: &mut [f32]) -> Result<()> {
-        self.expand(isa, pool, table.response.stored(), q)
+        if self.rows.is_empty() || q.is_empty() {
+            q.fill(0.0);
+            return Ok(());
+        }
+        let forces = (self.stored.as_slice(), self.forces.as_slice());
+        table.response.accumulate(isa, pool, forces, false, q)
     }
 
     /// The forces through a table of `[3D,n]`, for instance `force_to_z`.

@@ -6,6 +6,7 @@ use half::f16;
 use safetensors::tensor::Dtype;
 
 use super::numbers::fits;
+use super::response_table::Response;
 use crate::bundle::TensorFile;
 use crate::error::Result;
 use crate::memory;
@@ -26,30 +27,64 @@ pub(super) fn is_stepped(file: &TensorFile, tensor: &str) -> bool {
     file.has(&format!("{tensor}_step"))
 }
 
-/// The response `[3D,Q]`: `response` `[bytes]` u8, `response_widths` `[D,ceil(Q/32)]` u8 and `response_step` `[D]` f32, mm/mN. A group is eight
+/// The response: `response` `[bytes]` u8, `response_widths` `[D,ceil(Q/32)]` u8 and `response_step` `[D]` f32, mm/mN. A group is eight
 /// coordinates of a contact node's three rows; codes follow by node, group, row and coordinate.
-pub(super) fn response(file: &TensorFile, columns: usize, width: usize) -> Result<Vec<f16>> {
+pub(super) fn response(
+    file: &TensorFile,
+    columns: usize,
+    rank_offsets: &[usize],
+) -> Result<Response> {
+    let width = *rank_offsets.last().unwrap_or(&0);
     let (groups, stride) = (width / GROUP, (width / GROUP).div_ceil(4));
-    let widths = file.raw("response_widths", Dtype::U8, &[Some(columns), Some(stride)])?;
+    let shape = [Some(columns), Some(stride)];
+    let widths = file.raw("response_widths", Dtype::U8, &shape)?;
     let steps = steps(file, "response_step", columns)?;
     let own = |node: usize| &widths[node * stride..][..stride];
     let of_node = |node| (0..groups).map(move |group| 3 * bits(own(node), group));
     let total = (0..columns).flat_map(of_node).sum();
     let mut codes = file.raw("response", Dtype::U8, &[Some(total)])?;
     let size = (3 * columns).checked_mul(width);
-    let size = fits(file, "response_widths", size, widths.len() + total)?;
-    let mut whole = memory::filled(size, f16::ZERO, WHAT)?;
-    let rows = whole.chunks_exact_mut(3 * width.max(1));
-    for (node, (rows, &step)) in rows.zip(&steps).enumerate() {
-        for group in 0..groups {
-            let bits = bits(own(node), group);
-            for axis in 0..3 {
-                let to = &mut rows[axis * width + GROUP * group..][..GROUP];
-                codes = put(to, codes, bits, step);
+    fits(file, "response_widths", size, widths.len() + total)?;
+
+    let blocks = rank_offsets.len() - 1;
+    let mut kept = memory::room(columns * blocks, WHAT)?;
+    for node in 0..columns {
+        for pair in rank_offsets.windows(2) {
+            let (from, to) = (pair[0] / GROUP, pair[1] / GROUP);
+            let last = (from..to).rev().find(|&group| bits(own(node), group) > 0);
+            let count = last.map_or(0, |last| last + 1 - from);
+            kept.push(u8::try_from(count).map_err(|_| {
+                let problem = format!("node {node} has {} coordinates of a block", 8 * count);
+                file.bad("response_widths", format!("{problem}, more than 2040"))
+            })?);
+        }
+    }
+    let count = kept.iter().map(|&eights| 24 * usize::from(eights)).sum();
+    let mut values = memory::filled(count, f16::ZERO, WHAT)?;
+    let mut to = values.chunks_exact_mut(GROUP);
+    let mut starts = memory::room(groups, WHAT)?;
+    for (node, &step) in steps.iter().enumerate() {
+        starts.clear();
+        let mut end = 0;
+        for bytes in of_node(node) {
+            starts.push(end);
+            end += bytes;
+        }
+        let (own_codes, rest) = codes.split_at(end);
+        codes = rest;
+        for axis in 0..3 {
+            let kept = &kept[node * blocks..][..blocks];
+            for (&count, &offset) in kept.iter().zip(rank_offsets) {
+                let first = offset / GROUP;
+                let groups = first..first + usize::from(count);
+                for (group, to) in groups.zip(&mut to) {
+                    let bits = bits(own(node), group);
+                    put(to, &own_codes[starts[group] + axis * bits..], bits, step);
+                }
             }
         }
     }
-    Ok(whole)
+    Response::leading(values, kept, rank_offsets)
 }
 
 /// The basis, `size` numbers as `PriorTable` has them: `basis` `[bytes]` u8, `basis_widths` `[ceil(Q/32)]` u8 and `basis_step` `[Q/8]` f32. A group is

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::compliance::{Bases, Borrowed, Compliance};
 use super::numbers::Numbers;
+use super::response_table::Response;
 use super::vibration::FreeVibration;
 use crate::error::Result;
 use crate::kernels::rows::{BlockBasis, Copies};
@@ -32,7 +33,7 @@ pub struct PriorTable {
     basis: Arc<Numbers>,
     /// Response of a unit force on a column of the tables `[3D,Q]`, mm/mN; see [`PriorTable::stored_dof`].
     #[held(own)]
-    pub response: Arc<Numbers>,
+    pub response: Arc<Response>,
     /// Residual modes `[r,Q]`; empty where the bundle has none.
     pub residual: Vec<f32>,
     /// `[3D,r_z]`; empty where the bundle has none.
@@ -242,7 +243,7 @@ mod tests {
             rank_offsets: vec![0, 8],
             copies: None,
             basis: Arc::new(Numbers::F32(vec![0.0; 96])),
-            response: Arc::new(Numbers::F32(vec![0.0; 48])),
+            response: Arc::new(Response::Whole(Numbers::F32(vec![0.0; 48]))),
             residual: Vec::new(),
             force_to_z: Vec::new(),
             force_to_p: Vec::new(),

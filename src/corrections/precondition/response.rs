@@ -50,16 +50,9 @@ impl Preconditioner {
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
         let rows = env.space.rows();
         accumulate_rows(isa, pool, env.space.modes(), rows, &self.solved, false, q)?;
-        let response = env.prior.response.stored();
-        Ok(accumulate_rows(
-            isa,
-            pool,
-            response,
-            env.prior.stored_dofs(&self.dofs, &mut self.stored)?,
-            &self.forces,
-            true,
-            q,
-        )?)
+        let dofs = env.prior.stored_dofs(&self.dofs, &mut self.stored)?;
+        let loads = (dofs, self.forces.as_slice());
+        env.prior.response.accumulate(isa, pool, loads, true, q)
     }
 
     /// Adds the response of `K + kappa M` that takes the prescribed nodes to their targets: `u += L_C(target - u_C)`.
@@ -118,9 +111,8 @@ impl Preconditioner {
         let natural = &self.solved[..count];
         let modes = env.space.modes();
         accumulate_rows(isa, pool, modes, rows, natural, true, q)?;
-        let response = env.prior.response.stored();
         let dofs = env.prior.stored_dofs(dofs, &mut self.stored)?;
-        Ok(accumulate_rows(isa, pool, response, dofs, forces, true, q)?)
+        (env.prior.response).accumulate(isa, pool, (dofs, forces), true, q)
     }
 
     /// `coordinates = -N diag(1 / (m (w² + kappa))) N^T r` of a residual `[K,3]`, µN, that is zero at held nodes.

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use half::f16;
 use safetensors::tensor::Dtype;
 
 use super::{NO_COLUMN, PriorTable};
@@ -12,6 +11,7 @@ use crate::grid::{PointGrid, squared_distance};
 use crate::memory;
 use crate::prior::compliance::Compliance;
 use crate::prior::numbers::{Numbers, fits};
+use crate::prior::response_table::Response;
 use crate::prior::stepped;
 use crate::prior::vibration::FreeVibration;
 
@@ -121,11 +121,12 @@ impl PriorTable {
             in_domain[node as usize] = true;
         }
         let response = if stepped::is_stepped(file, "response") {
-            Numbers::of_f16(stepped::response(file, contact_nodes.len(), width)?)?
+            stepped::response(file, contact_nodes.len(), &rank_offsets)?
         } else if file.has(RANKS) {
             ragged(file, contact_nodes.len(), &rank_offsets)?
         } else {
-            Numbers::read(file, "response", &[Some(dofs), Some(width)])?
+            let shape = [Some(dofs), Some(width)];
+            Response::Whole(Numbers::read(file, "response", &shape)?)
         };
         let basis = if stepped::is_stepped(file, "basis") {
             Numbers::of_f16(stepped::basis(file, &block_offsets, &rank_offsets, size)?)?
@@ -165,7 +166,7 @@ impl PriorTable {
 const RANKS: &str = "response_ranks";
 
 /// A response that holds of each block the leading coordinates alone, `[3D,Q]`: what a contact node does not reach is zero.
-fn ragged(file: &TensorFile, columns: usize, rank_offsets: &[usize]) -> Result<Numbers> {
+fn ragged(file: &TensorFile, columns: usize, rank_offsets: &[usize]) -> Result<Response> {
     let blocks = rank_offsets.len() - 1;
     let width = rank_offsets[blocks];
     let kept = file.raw(RANKS, Dtype::U8, &[Some(columns), Some(blocks)])?;
@@ -182,23 +183,13 @@ fn ragged(file: &TensorFile, columns: usize, rank_offsets: &[usize]) -> Result<N
         count += 24 * usize::from(eights);
     }
     let stored = file.f16("response", &[Some(count)])?;
-    let size = fits(
+    fits(
         file,
         RANKS,
         (3 * columns).checked_mul(width),
         kept.len() + count,
     )?;
-    let mut whole = memory::filled(size, f16::ZERO, WHAT)?;
-    let mut from = stored.as_slice();
-    for (row, to) in whole.chunks_exact_mut(width.max(1)).enumerate() {
-        let kept = &kept[row / 3 * blocks..][..blocks];
-        for (&eights, &start) in kept.iter().zip(rank_offsets) {
-            let (own, rest) = from.split_at(8 * usize::from(eights));
-            to[start..start + own.len()].copy_from_slice(own);
-            from = rest;
-        }
-    }
-    Numbers::of_f16(whole)
+    Response::leading(stored, memory::copied(kept, WHAT)?, rank_offsets)
 }
 
 /// By node: where its three rows in the basis start, where the coordinates of its block start, and how many.

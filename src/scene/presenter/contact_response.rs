@@ -39,14 +39,13 @@ impl ContactResponse<'_> {
         }
         let (isa, pool, modes) = (self.isa, self.pool, self.space.modes());
         accumulate_rows(isa, pool, modes, self.rows, natural, onto, q)?;
-        let response = self.prior.response.stored();
+        let response = &self.prior.response;
         if !self.prior.borrows() {
-            accumulate_rows(isa, pool, response, change.dofs, change.forces, true, q)?;
-            return Ok(());
+            return response.accumulate(isa, pool, (change.dofs, change.forces), true, q);
         }
         for (&dof, &force) in change.dofs.iter().zip(change.forces) {
             let row = self.prior.stored_dof(dof);
-            accumulate_rows(isa, pool, response, &[row], &[force], true, q)?;
+            response.accumulate(isa, pool, (&[row], &[force]), true, q)?;
         }
         Ok(())
     }
