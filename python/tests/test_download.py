@@ -85,5 +85,5 @@ def test_the_wheel_knows_the_bundles_of_its_day(mirror, monkeypatch):
     folder = upt.download("brain-fast")  # its body lies with another bundle
     assert digest(folder / "bundle.json") == digest(ROOT / "onnx" / "brain-fast" / "bundle.json")
     with pytest.raises(OSError, match=r"brain-paper"):  # known, and not on this mirror
-        upt.download("brain-paper")
+        upt.download("brain-paper", mirror=mirror)
     assert upt.Model(upt.bundle("liver-coarse")).node_count == 1178
