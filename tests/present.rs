@@ -144,7 +144,7 @@ fn a_host_that_took_a_step_for_the_one_before_shows_the_step_as_it_is() {
         present(&scene, 0.02, &pressing(&scene, f64::from(t) + 0.4));
     }
     let u = step(&scene, &pressing(&scene, 4.0));
-    // The step has come in while the host still counts from the one before.present(Contact::Tools(DT + 0.001), &scene, View::Region, &pressing(&scene, 4.02));
+    // The step has come in while the host still counts from the one before.
     let shown = present(&scene, 0.001, &pressing(&scene, 4.02));
     assert!(farthest(&shown, &u) < 0.05);
 }
