@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::counts::{Counts, Outcome};
 use crate::evidence::{self, Tree};
@@ -72,6 +72,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         let left_out = all(NIGHTLY).filter(|stage| !asked(stage));
         let skipped = || Outcome::skipped("nightly, or --only it");
         rows.extend(left_out.map(|stage| (stage.name, skipped(), 0.0)));
+        rows.extend(absent_bundles(workspace)?.map(|outcome| ("bundles", outcome, 0.0)));
     }
     let stages = rows.iter().map(|(name, outcome, seconds)| {
         let counts = outcome.counts;
@@ -86,6 +87,29 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     });
     evidence::write(workspace, &tree, stages.collect())?;
     Ok(summarise(&rows))
+}
+
+/// The bundles of `onnx/index.json` that this clone does not hold, which tests over all of `onnx/` go without.
+fn absent_bundles(workspace: &Workspace) -> Result<Option<Outcome>> {
+    let folder = workspace.root.join("onnx");
+    let path = folder.join("index.json");
+    let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    let index: Value = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+    let names = index["assets"]
+        .as_object()
+        .into_iter()
+        .flat_map(|assets| assets.keys());
+    let is_absent = |name: &&String| !folder.join(name).join("bundle.json").is_file();
+    let absent: Vec<&str> = names.filter(is_absent).map(String::as_str).collect();
+    if absent.is_empty() {
+        return Ok(None);
+    }
+    let mut outcome = Outcome::skipped(&format!(
+        "not in this clone, `upt bundle get NAME --out onnx`: {}",
+        absent.join(", ")
+    ));
+    outcome.counts.skipped = absent.len() as u64;
+    Ok(Some(outcome))
 }
 
 /// Lanes at the same time, the stages of each one after another.
