@@ -233,10 +233,7 @@ fn far_block(
     }
     let (rows, forces) = scratch[..6 * rank].split_at_mut(3 * rank);
     bases.basis.widen(row as usize, rows);
-    for (axis, force) in forces.chunks_exact_mut(rank.max(1)).enumerate() {
-        let row = 3 * other + axis;
-        bases.response.widen(row, bases.width, start, force);
-    }
+    bases.response.widen(other, bases.width, start, forces);
     std::array::from_fn(|at| {
         dot(
             &rows[at / 3 * rank..][..rank],
@@ -292,10 +289,8 @@ impl Near {
                     if !std::mem::replace(&mut widened, true) {
                         bases.basis.widen(self.rows[node] as usize, rows);
                     }
-                    for (axis, force) in forces.chunks_exact_mut(rank.max(1)).enumerate() {
-                        let row = 3 * other as usize + axis;
-                        bases.response.widen(row, bases.width, start, force);
-                    }
+                    let other = other as usize;
+                    bases.response.widen(other, bases.width, start, forces);
                     for (at, value) in block.iter_mut().enumerate() {
                         *value = dot(
                             &rows[at / 3 * rank..][..rank],

@@ -123,22 +123,32 @@ impl Response {
         }
     }
 
-    /// Coordinates `[start, start + out.len())` of a row, those of one block; `width` is `Q`.
-    pub(super) fn widen(&self, row: usize, width: usize, start: usize, out: &mut [f32]) {
+    /// Coordinates `[start, start + rank)` of a node's three rows, those of one block, into `out [3,rank]`; `width` is `Q`.
+    pub(super) fn widen(&self, node: usize, width: usize, start: usize, out: &mut [f32]) {
+        let rank = out.len() / 3;
+        let rows = out.chunks_exact_mut(rank.max(1));
         match self {
-            Response::Whole(numbers) => numbers.widen(row * width + start, out),
+            Response::Whole(numbers) => {
+                for (axis, out) in rows.enumerate() {
+                    numbers.widen((3 * node + axis) * width + start, out);
+                }
+            }
             Response::Leading(leading) => {
-                let (node, axis) = (row / 3, row % 3);
                 let offsets = &leading.rank_offsets;
                 // The last that starts there: one before it may have no coordinate.
                 let block = offsets.partition_point(|&own| own as usize <= start) - 1;
                 let blocks = offsets.len() - 1;
-                let kept = &leading.kept[node * blocks..][..blocks];
-                let count = |own: &[u8]| 8 * own.iter().map(|&x| usize::from(x)).sum::<usize>();
-                let (own, rest) = out.split_at_mut(8 * usize::from(kept[block]));
-                let from = leading.starts[node] + axis * count(kept);
-                leading.values.widen(from + count(&kept[..block]), own);
-                rest.fill(0.0);
+                let kept = &leading.kept[node * blocks..][..=block];
+                let before = kept[..block].iter().map(|&eights| usize::from(eights));
+                let before = 8 * before.sum::<usize>();
+                let (from, to) = (leading.starts[node], leading.starts[node + 1]);
+                for (axis, out) in rows.enumerate() {
+                    let (own, rest) = out.split_at_mut(8 * usize::from(kept[block]));
+                    leading
+                        .values
+                        .widen(from + axis * (to - from) / 3 + before, own);
+                    rest.fill(0.0);
+                }
             }
         }
     }
@@ -165,12 +175,12 @@ mod tests {
         }
         let whole = Response::Whole(Numbers::of_f16(whole).unwrap());
         let leading = Response::leading(values, kept.as_flattened().to_vec(), &offsets).unwrap();
-        for row in 0..6 {
+        for node in 0..2 {
             for (start, rank) in [(0, 16), (16, 8)] {
-                let (mut a, mut b) = (vec![f32::NAN; rank], vec![f32::NAN; rank]);
-                whole.widen(row, width, start, &mut a);
-                leading.widen(row, width, start, &mut b);
-                assert_eq!(a, b, "row {row}, block at {start}");
+                let (mut a, mut b) = (vec![f32::NAN; 3 * rank], vec![f32::NAN; 3 * rank]);
+                whole.widen(node, width, start, &mut a);
+                leading.widen(node, width, start, &mut b);
+                assert_eq!(a, b, "node {node}, block at {start}");
             }
         }
         assert_eq!(
