@@ -185,8 +185,8 @@ fn below(point: Vector, nearest: u32, samples: &Samples, state: State<'_>) -> Op
 /// Whether no part of the surface that tools do not touch is clearly nearer to a point than a touchable one, `depth` away.
 fn is_touchable(point: Vector, depth: f32, mesh: &Mesh, state: State<'_>) -> bool {
     let nodes = mesh.surface_nodes.iter();
-    let nearest = nodes.map(|node| state.position(*node).distance(point));
-    depth <= 1.5 * nearest.fold(f32::MAX, f32::min)
+    let squares = nodes.map(|node| state.position(*node).distance_squared(point));
+    depth <= 1.5 * squares.fold(f32::MAX, f32::min).sqrt()
 }
 
 /// Whether a ray from a point leaves the surface more often than it enters it.

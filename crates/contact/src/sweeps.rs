@@ -233,11 +233,11 @@ impl Sweeps {
             let change = block.frame * change;
             forces[i] = block.frame * wanted;
             self.work += 3 * self.shift.len() as u64;
-            let rows = delassus.rows(i).chunks_exact(self.shift.len());
-            for (row, df) in rows.zip(change.to_array()) {
-                for (shift, w) in self.shift.iter_mut().zip(row) {
-                    *shift += w * df;
-                }
+            let (x, others) = delassus.rows(i).split_at(self.shift.len());
+            let (y, z) = others.split_at(self.shift.len());
+            let rows = x.iter().zip(y).zip(z);
+            for (shift, ((x, y), z)) in self.shift.iter_mut().zip(rows) {
+                *shift = *shift + x * change.x + y * change.y + z * change.z;
             }
         }
         largest
