@@ -21,7 +21,7 @@ use upt_cli::counted::counted;
 
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  upt-study stress --quick\n  upt-study stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown PAGE\n  upt-study stress --no-reference --sudden --bundle onnx/brain-reduced"
+    after_help = "Examples:\n  upt-study stress --quick\n  upt-study stress --bundle onnx/brain-reduced --bundle onnx/brain-fast --markdown PAGE\n  upt-study stress --no-reference --sudden --bundle onnx/brain-reduced\n  upt-study stress --no-reference --sudden deep,cut --bundle onnx/brain-reduced"
 )]
 pub struct Options {
     /// Bundle folders to stress. Default: only the reference solver.
@@ -33,9 +33,9 @@ pub struct Options {
     /// Leave out the reference solver.
     #[arg(long)]
     no_reference: bool,
-    /// Of bundles only the rows of quick, thin, pointed and deep tools.
-    #[arg(long)]
-    sudden: bool,
+    /// Of bundles only the rows that a step could lose or that take longest, or those of some kinds.
+    #[arg(long, value_enum, num_args = 0.., value_delimiter = ',', value_name = "KIND")]
+    sudden: Option<Vec<tools::Sudden>>,
     /// Make a twentieth of the steps, for tests.
     #[arg(long)]
     quick: bool,
@@ -53,9 +53,9 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         rows.extend(reference::rows(options.mesh.as_deref(), options.quick)?);
     }
     for bundle in &options.bundles {
-        let found = match options.sudden {
-            true => surrogate::sudden_rows(bundle, options.quick),
-            false => surrogate::rows(bundle, options.quick),
+        let found = match &options.sudden {
+            Some(kinds) => surrogate::sudden_rows(bundle, options.quick, kinds),
+            None => surrogate::rows(bundle, options.quick),
         };
         rows.extend(found.with_context(|| format!("{}", bundle.display()))?);
     }

@@ -33,9 +33,9 @@ pub fn rows(path: &Path, quick: bool) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Those of quick, thin, pointed and deep tools alone.
-pub fn sudden_rows(path: &Path, quick: bool) -> Result<Vec<Row>> {
-    tools::sudden_rows(&Bench::open(path, quick)?, path)
+/// Those of some kinds of sudden tools alone; none named: all.
+pub fn sudden_rows(path: &Path, quick: bool, kinds: &[tools::Sudden]) -> Result<Vec<Row>> {
+    tools::sudden_rows(&Bench::open(path, quick)?, path, kinds)
 }
 
 /// No false alarm on the schemes that the model was trained on.

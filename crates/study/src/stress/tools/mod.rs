@@ -14,6 +14,7 @@ mod truth;
 use std::path::Path;
 
 use anyhow::Result;
+use clap::ValueEnum as _;
 use contact::Vector;
 use tissue::programmes::{ToolCase, ToolProgramme};
 use tissue::schemes::SplitMix;
@@ -36,7 +37,7 @@ pub fn rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
     bar.inc(1);
     rows.extend(inside(&mut hands)?);
     bar.inc(1);
-    rows.extend(sudden_rows(bench, path)?);
+    rows.extend(sudden_rows(bench, path, &[])?);
     bar.inc(1);
     rows.push(random(&mut hands)?);
     bar.inc(1);
@@ -45,13 +46,33 @@ pub fn rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Tools that a step could lose, and those whose step takes longest.
-pub fn sudden_rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
-    let mut hands = Hands::for_frames(bench, path)?;
-    let mut rows = sudden::rows(&mut hands)?;
-    rows.extend(thrust::rows(&mut hands)?);
-    rows.extend(deep::rows(bench, path)?);
-    rows.extend(cut_rows::rows(bench, path)?);
+/// Kinds of tools that a step could lose, or whose step takes longest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Sudden {
+    /// Quick balls, balls that leap, needles, points, and balls beneath the surface.
+    Quick,
+    /// Blades that press and leap on.
+    Thrust,
+    /// Three tools at random deep poses: the longest step.
+    Deep,
+    /// Blades and aspirators.
+    Cut,
+}
+
+/// Rows of these kinds; none named: all.
+pub fn sudden_rows(bench: &Bench, path: &Path, kinds: &[Sudden]) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    for kind in Sudden::value_variants() {
+        if !kinds.is_empty() && !kinds.contains(kind) {
+            continue;
+        }
+        rows.extend(match kind {
+            Sudden::Quick => sudden::rows(&mut Hands::for_frames(bench, path)?)?,
+            Sudden::Thrust => thrust::rows(&mut Hands::for_frames(bench, path)?)?,
+            Sudden::Deep => deep::rows(bench, path)?,
+            Sudden::Cut => cut_rows::rows(bench, path)?,
+        });
+    }
     Ok(rows)
 }
 
