@@ -86,12 +86,12 @@ impl Cost {
     /// Forces by the kept factor, rows of the response, rows of the basis.
     fn add_prior(&mut self, table: &PriorTable, nodes: f64) {
         let (basis, basis_size) = size(&table.basis().basis);
-        let (_, response_size) = size(&table.response.stored());
-        let width = table.width() as f64;
+        let (response, response_size) = size(&table.response.stored());
+        let response = response / table.contact_nodes.len() as f64;
         self.flops_a_node += 2.0 * basis / nodes;
         self.bytes_a_node += basis * basis_size / nodes;
-        self.flops_a_contact += 6.0 * width;
-        self.bytes_a_contact += 3.0 * width * response_size;
+        self.flops_a_contact += 2.0 * response;
+        self.bytes_a_contact += response * response_size;
     }
 
     /// FLOP and bytes of the last step of a scene that shows `region`; `None` where bundle.json has no

@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::kernels::project::row_dots;
 use crate::kernels::ragged::Ragged;
 use crate::kernels::respond::accumulate_rows;
+use crate::kernels::rows::Stored;
 use crate::kernels::{Isa, Pool};
 use crate::memory::{self, HeldBytes};
 
@@ -112,6 +113,14 @@ impl Response {
             Response::Leading(leading) => leading.table().dots(isa, pool, rows, q, out)?,
         }
         Ok(())
+    }
+
+    /// The numbers that it holds.
+    pub fn stored(&self) -> Stored<'_> {
+        match self {
+            Response::Whole(numbers) => numbers.stored(),
+            Response::Leading(leading) => leading.values.stored(),
+        }
     }
 
     /// Bytes that some rows hold; `width` is `Q`.
