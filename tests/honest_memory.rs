@@ -116,8 +116,9 @@ fn memory_is_stated_to_ten_percent_and_given_back() {
     let after = resident();
     println!("resident: {before} before, {most} with 200 scenes, {after} after");
     assert!(most > 1.5 * before, "the scenes were there");
+    // What allocators keep is no more than some scenes' worth.
     assert!(
-        after < 1.2 * before,
+        after - before < 0.02 * (most - before),
         "{after} bytes are resident, {before} were before"
     );
     assert_eq!(unsafe { upt_model_close(model) }, UPT_OK);
