@@ -65,12 +65,19 @@ namespace Upt.Tests
         public void BundlePathMayHoldNonAsciiCharacters()
         {
             string folder = Path.Combine(Path.GetTempPath(), "upt-\u00e9\u8133-" + Guid.NewGuid().ToString("N"));
-            Directory.CreateDirectory(folder);
+            string name = Path.GetFileName(Bundle.Path);
             try
             {
-                foreach (string file in Directory.GetFiles(Bundle.Path))
-                    File.Copy(file, Path.Combine(folder, Path.GetFileName(file)));
-                using (Model model = new Model(folder, 1)) Assert.That(model.NodeCount, Is.GreaterThan(0));
+                // Beside it what it takes from its body.
+                foreach (string copied in name == "brain" ? new[] { name } : new[] { name, "brain" })
+                {
+                    string source = Path.Combine(Path.GetDirectoryName(Bundle.Path), copied);
+                    if (!Directory.Exists(source)) continue;
+                    Directory.CreateDirectory(Path.Combine(folder, copied));
+                    foreach (string file in Directory.GetFiles(source))
+                        File.Copy(file, Path.Combine(folder, copied, Path.GetFileName(file)));
+                }
+                using (Model model = new Model(Path.Combine(folder, name), 1)) Assert.That(model.NodeCount, Is.GreaterThan(0));
             }
             finally
             {
