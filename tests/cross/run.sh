@@ -59,7 +59,7 @@ installed "$prefix"
 cmake -S tests/c -B "$build/tests" -DCMAKE_TOOLCHAIN_FILE="$root/xtask/cross/toolchain.cmake" \
   -DCMAKE_BUILD_TYPE=Release -Dupt_DIR="$prefix/lib/cmake/upt" -DUPT_ROOT="$root" -DUPT_PREFIX="$prefix" \
   -DUPT_FIXTURE="$root/tests/fixtures/tiny-upt" -DUPT_REDUCED="$root/tests/fixtures/tiny-reduced" \
-  -DUPT_CORRECTED="$root/tests/fixtures/tiny-corrected" >"$build/configure.log"
+  -DUPT_CORRECTED="$root/tests/fixtures/tiny-corrected" -DUPT_LIVER="$root/onnx/liver-coarse" >"$build/configure.log"
 cmake --build "$build/tests" --parallel 2 >"$build/build.log" 2>&1 || cat "$build/build.log"
 (cd "$build/tests" && ctest --output-on-failure --no-tests=error >"$build/ctest.log" 2>&1) || true
 count_ctest "$build/ctest.log"
