@@ -190,6 +190,7 @@ impl ImplicitSolver {
                 // An iteration after each of `iterated` parts of the load but the last.
                 let due = part * iterated / parts > last * iterated / parts;
                 let spent = problem.work.is_spent() || is_spent(input, problem, report, 1);
+                let spent = spent || problem.work.is_half_over();
                 if due && part < parts && !spent {
                     self.settle(env, at.u)?;
                     self.evaluate(context, input, at, report)?;

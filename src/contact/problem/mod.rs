@@ -8,6 +8,7 @@ mod depth;
 mod forces;
 mod loads;
 mod look;
+mod parts;
 mod solve;
 mod thrust;
 mod tie_set;
@@ -38,10 +39,6 @@ use look::MOST_ROWS;
 use work::Work;
 
 const WHAT: &str = "the contact of instruments";
-/// Parts of a step's way at most.
-const MOST_PARTS: f32 = 80.0;
-/// Parts of the tools' ways in a step that has taken its time.
-const LEAST_PARTS: u32 = 4;
 /// A tool that goes farther in a step is quick, mm.
 const QUICK_MM: f32 = 0.5;
 /// Tissue no deeper than this in a tool is clear of it, mm.
@@ -358,28 +355,6 @@ impl ContactProblem {
     pub fn has_grasp(&self) -> bool {
         let holds = |held: &Held| !held.grasp.anchors().is_empty();
         self.next.tools.iter().any(holds)
-    }
-
-    /// In how many parts the tools' ways are taken: no tool may pass a sample between two looks, and none may push it over its own
-    /// edge.
-    pub fn parts(&self) -> u32 {
-        if self.work.is_spent() {
-            return LEAST_PARTS;
-        }
-        let parts = self.tools.iter().zip(&self.before).map(|(tool, from)| {
-            let most = (0.5 * tool.body.radius()).clamp(0.5, 2.0);
-            (tool.body.motion(from, &tool.pose) / most).ceil()
-        });
-        parts.fold(1.0, f32::max).min(MOST_PARTS) as u32
-    }
-
-    /// The part of `parts` to take after part `part`: the next, or one of [`LEAST_PARTS`] once the solves have taken their time.
-    pub fn next_part(&self, part: u32, parts: u32) -> u32 {
-        let stride = match self.work.is_spent() {
-            true => parts.div_ceil(LEAST_PARTS),
-            false => 1,
-        };
-        (part + stride).min(parts)
     }
 
     /// Nodes of the surface that tools may touch, all that a solve asks of a state of the tissue.

@@ -20,8 +20,9 @@ const SHORT_OF_WORK: u64 = SOLVES_WORK / 2;
 #[derive(Debug, HeldBytes)]
 pub struct Work {
     solves: u64,
-    /// When the step's budget of time ends.
+    /// When the step's budget of time ends, and when half of it is over.
     until: Option<Instant>,
+    half: Option<Instant>,
 }
 
 impl Work {
@@ -30,6 +31,7 @@ impl Work {
         Work {
             solves: SOLVES_WORK,
             until: None,
+            half: None,
         }
     }
 
@@ -42,6 +44,7 @@ impl Work {
         Work {
             solves: solves + more,
             until: None,
+            half: None,
         }
     }
 
@@ -75,11 +78,22 @@ impl Work {
     /// Sets when the step's budget of time ends. From then on its solves take the least work.
     pub fn end_by(&mut self, until: Option<Instant>) {
         self.until = until;
+        let now = Instant::now();
+        self.half = until.map(|until| now + until.saturating_duration_since(now) / 2);
+    }
+
+    /// Whether half of the step's budget of time is over: too late for iterations that a guess could do without.
+    pub fn is_half_over(&self) -> bool {
+        self.half.is_some_and(|half| Instant::now() >= half)
+    }
+
+    /// Whether the step's budget of time is over.
+    pub fn is_late(&self) -> bool {
+        self.until.is_some_and(|until| Instant::now() >= until)
     }
 
     /// Whether the solves of this step have taken their work or time.
     pub fn is_spent(&self) -> bool {
-        let is_late = || self.until.is_some_and(|until| Instant::now() >= until);
-        self.solves == 0 || is_late()
+        self.solves == 0 || self.is_late()
     }
 }
