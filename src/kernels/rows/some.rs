@@ -66,6 +66,10 @@ pub fn project_rows(isa: Isa, basis: &BlockBasis<'_>, plan: &RowPlan, r: &[f32],
         let q = &mut q[ranks[k] as usize..ranks[k + 1] as usize];
         let range = plan.basis_offsets[k]..plan.basis_offsets[k + 1];
         let (locals, outputs) = (&plan.locals[items.clone()], &plan.outputs[items]);
+        // Fields of a few nodes are nothing in most blocks.
+        if outputs.iter().all(|&row| r[3 * row as usize..][..3] == [0.0; 3]) {
+            continue;
+        }
         match basis.basis {
             Stored::F32(basis) => add_f32(isa, &basis[range], locals, outputs, r, q),
             Stored::F16(basis) => add_f16(isa, &basis[range], locals, outputs, r, q),
