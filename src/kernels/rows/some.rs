@@ -67,7 +67,10 @@ pub fn project_rows(isa: Isa, basis: &BlockBasis<'_>, plan: &RowPlan, r: &[f32],
         let range = plan.basis_offsets[k]..plan.basis_offsets[k + 1];
         let (locals, outputs) = (&plan.locals[items.clone()], &plan.outputs[items]);
         // Fields of a few nodes are nothing in most blocks.
-        if outputs.iter().all(|&row| r[3 * row as usize..][..3] == [0.0; 3]) {
+        if outputs
+            .iter()
+            .all(|&row| r[3 * row as usize..][..3] == [0.0; 3])
+        {
             continue;
         }
         match basis.basis {
