@@ -1,17 +1,25 @@
-"""The table of what each bundle recommends, in docs/guide/accuracy.md: `bundles.py --write` writes it.
+"""What pages say of bundles: the docs stage compares it with the manifests and certificates in `onnx/`.
 
-The docs stage compares it with the manifests in `onnx/`.
+`bundles.py --write` writes the table of what each bundle recommends (docs/guide/accuracy.md), and a certificate read
+aloud (docs/guide/make.md). No page gives an organ of `onnx/meshes` another number of nodes than its manifest.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 
+from certificate import aloud
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs/guide/accuracy.md"
+CERTIFIED = ROOT / "docs/guide/make.md"
 BEGIN, END = "<!-- bundles: begin -->\n", "<!-- bundles: end -->"
+COUNT = re.compile(r"\bK = (\d[\d,]*)|\b(\d[\d,]*) nodes\b")
+# As near to a bundle's number of nodes as this, another number means the same mesh.
+NEAR = 0.01
 HEAD = "| folder in `onnx/` | kind | nodes | boundary | corrections | target, mm | substeps | frame step, ms |"
 
 
@@ -40,19 +48,48 @@ def table() -> str:
     return "\n".join([HEAD, "|---|---|---:|---|---:|---:|---:|---:|", *rows]) + "\n"
 
 
+PARTS = (
+    (PAGE, BEGIN, END, table),
+    (
+        CERTIFIED,
+        "<!-- certificate: begin -->\n",
+        "<!-- certificate: end -->",
+        lambda: aloud(ROOT / "onnx/liver-coarse"),
+    ),
+)
+
+
+def wrong_counts(page: Path, known: set[int]) -> list[str]:
+    """Numbers of nodes that are nearly a bundle's."""
+    found = []
+    for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
+        for match in COUNT.finditer(line):
+            count = int((match[1] or match[2]).replace(",", ""))
+            near = [nodes for nodes in known if 0 < abs(count - nodes) <= NEAR * nodes]
+            if near and "paper" not in line:
+                found.append(f"{page.relative_to(ROOT)}:{number}: {match[0]}: the bundle has {near[0]:,} nodes")
+    return found
+
+
 def faults() -> list[str]:
-    """Whether the page has another table than the manifests."""
-    _, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    if begin and rest.partition(END)[0] == table():
-        return []
-    return [f"{PAGE.relative_to(ROOT)}: the table of bundles is not that of onnx/; run tests/docs/bundles.py --write"]
+    """Pages that say something else than manifests and certificates."""
+    found = []
+    for page, begin, end, make in PARTS:
+        _, has, rest = page.read_text(encoding="utf-8").partition(begin)
+        if not has or rest.partition(end)[0] != make():
+            where = page.relative_to(ROOT)
+            found.append(f"{where}: {begin.strip()} is not what onnx/ says; run tests/docs/bundles.py --write")
+    manifests = (json.loads(path.read_text(encoding="utf-8")) for path in ROOT.glob("onnx/*/bundle.json"))
+    known = {manifest["mesh"]["nodes"] for manifest in manifests}
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    return found + [fault for page in pages for fault in wrong_counts(page, known)]
 
 
 def write() -> None:
-    """Exchange the table in the page."""
-    before, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    _, end, after = rest.partition(END)
-    PAGE.write_text(before + begin + table() + end + after, encoding="utf-8")
+    """Exchange the parts of the pages."""
+    for page, begin, end, make in PARTS:
+        before, has, rest = page.read_text(encoding="utf-8").partition(begin)
+        page.write_text(before + has + make() + end + rest.partition(end)[2], encoding="utf-8")
 
 
 if __name__ == "__main__":
