@@ -11,13 +11,17 @@ images that it left in target/results/images. New files begin with `--mark "LINE
 A page shows a table behind `<!-- results: NAME NUMBER | COLUMN; COLUMN | COLUMN = VALUE -->`, to the next empty line;
 tables are counted from 1. `NAME said NUMBER ...` are the sentences before tables, `NAME after NUMBER ...` those at the
 end of blocks. Columns and the condition on rows (`~`: a regular expression) may be left out; a column without a title
-is `row`. The docs stage checks that pages are what their data make them, and that a page names every file.
+is `row`. Behind `<!-- results: ages -->` a page says which of its figures are older than the code that they measure: a
+measurement keeps the hashes of that code (`inputs`). The docs stage checks that pages are what their data make them,
+and that a page names every file; that no figure has become old unsaid is checked where UPT_NIGHTLY is set, since each
+change of the code makes figures old.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import platform
 import re
 import subprocess
@@ -36,6 +40,16 @@ def git(*words: str) -> str:
     """What git says; empty where it fails."""
     done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False)
     return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def inputs(measured: list[str]) -> dict[str, str]:
+    """Hashes of the code that a measurement measures, as it is committed."""
+    return {path: git("rev-parse", f"HEAD:{path}") for path in measured}
+
+
+def is_old(block: dict) -> bool:
+    """Whether the code of a measurement has changed since."""
+    return block.get("inputs") != inputs(block["measures"])
 
 
 def cells(line: str) -> list[str]:
@@ -136,6 +150,7 @@ def run(options: argparse.Namespace) -> None:
                 "date": date.today().isoformat(),
                 "commit": git("rev-parse", "--short=12", "HEAD"),
                 "measures": options.measures,
+                "inputs": inputs(options.measures),
             }
     write(options.name, blocks)
 
@@ -167,22 +182,44 @@ def markdown(what: str) -> str:
     return "".join(f"{line}\n" for line in chosen)
 
 
+def old(text: str) -> str:
+    """What a page says of the age of its figures."""
+    named = set(re.findall(r"data/([\w-]+)\.json", text)) | {mark["what"].split()[0] for mark in MARK.finditer(text)}
+    dates: dict[str, list[str]] = {}
+    for name in sorted(named - {"ages"}):
+        for block in filter(is_old, read(name)):
+            dates.setdefault(block["date"], []).append(name)
+    if not dates:
+        return ""
+    said = (f"{date} ({', '.join(dict.fromkeys(names))})" for date, names in sorted(dates.items()))
+    return f"*Older than the code that they measure*, the figures of {'; '.join(said)}.\n"
+
+
 def shown(page: Path, faults: list[str]) -> str:
-    """A page with the tables of the data."""
+    """A page with the tables of the data, and the age of its figures."""
+    text = page.read_text(encoding="utf-8")
 
     def fill(mark: re.Match) -> str:
         try:
-            return f"<!-- results: {mark['what']} -->\n{markdown(mark['what'])}"
+            made = old(text) if mark["what"] == "ages" else markdown(mark["what"])
+            return f"<!-- results: {mark['what']} -->\n{made}"
         except (OSError, ValueError, IndexError) as error:
             faults.append(f"{page.relative_to(ROOT)}: {mark['what']}: {error}")
             return mark[0]
 
-    return MARK.sub(fill, page.read_text(encoding="utf-8"))
+    return MARK.sub(fill, text)
 
 
 def pages() -> list[Path]:
     """All pages of docs: each may show results."""
     return sorted((ROOT / "docs").rglob("*.md"))
+
+
+def compared(text: str) -> str:
+    """What the docs stage compares of a page."""
+    if os.environ.get("UPT_NIGHTLY"):
+        return text
+    return MARK.sub(lambda mark: "" if mark["what"] == "ages" else mark[0], text)
 
 
 def faults() -> list[str]:
@@ -192,7 +229,7 @@ def faults() -> list[str]:
     for page in pages():
         fresh = shown(page, found)
         text += fresh
-        if fresh != page.read_text(encoding="utf-8"):
+        if compared(fresh) != compared(page.read_text(encoding="utf-8")):
             found.append(f"{page.relative_to(ROOT)}: a table is stale; run tests/docs/results.py show")
     for file in sorted(DATA.glob("*.json")):
         if f"data/{file.name}" not in text:
@@ -209,11 +246,10 @@ def ages() -> list[str]:
     """For each measurement whose code has changed since: its commit, and how many commits changed that code."""
     lines = []
     for file in sorted(DATA.glob("*.json")):
-        for block in read(file.stem):
+        for block in filter(is_old, read(file.stem)):
             since = git("rev-list", "--count", f"{block['commit']}..HEAD", "--", *block["measures"])
-            if since != "0":
-                code = " ".join(block["measures"])
-                lines.append(f"{file.stem}: {block['date']}, {block['commit']}: {since or '?'} commits to {code} since")
+            code = " ".join(block["measures"])
+            lines.append(f"{file.stem}: {block['date']}, {block['commit']}: {since or '?'} commits to {code} since")
     return lines
 
 
