@@ -10,11 +10,11 @@ images that it left in target/results/images. New files begin with `--mark "LINE
 
 A page shows a table behind `<!-- results: NAME NUMBER | COLUMN; COLUMN | COLUMN = VALUE -->`, to the next empty line;
 tables are counted from 1. `NAME said NUMBER ...` are the sentences before tables, `NAME after NUMBER ...` those at the
-end of blocks. Columns and the condition on rows (`~`: a regular expression) may be left out; a column without a title
-is `row`. Behind `<!-- results: ages -->` a page says which of its figures are older than the code that they measure: a
-measurement keeps the hashes of that code (`inputs`). The docs stage checks that pages are what their data make them,
-and that a page names every file; that no figure has become old unsaid is checked where UPT_NIGHTLY is set, since each
-change of the code makes figures old.
+end of blocks; `step-times` is the table of step_times.py. Columns and the condition on rows (`~`: a regular expression)
+may be left out; a column without a title is `row`. Behind `<!-- results: ages -->` a page says which of its figures are
+older than the code that they measure: a measurement keeps the hashes of that code (`inputs`). The docs stage checks
+that pages are what their data make them, and that a page names every file; that no figure has become old unsaid is
+checked where UPT_NIGHTLY is set, since each change of the code makes figures old.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ import subprocess
 import sys
 from datetime import date
 from pathlib import Path
+
+import step_times
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs/results"
@@ -159,6 +161,8 @@ def markdown(what: str) -> str:
     """The lines of a mark."""
     source, columns, condition = ([part.strip() for part in re.split(r"\s\|(?=\s)", what)] + ["", ""])[:3]
     name, *part = source.split()
+    if name == "step-times":
+        return step_times.table(read)
     blocks = read(name)
     tables = [table for block in blocks for table in block["tables"]]
     if part[0] in ("said", "after"):
@@ -224,7 +228,7 @@ def compared(text: str) -> str:
 
 def faults() -> list[str]:
     """Pages that are not what the data make them, and files that no page names."""
-    found: list[str] = []
+    found = step_times.faults(ROOT / "README.md", read)
     text = ""
     for page in pages():
         fresh = shown(page, found)

@@ -1,16 +1,17 @@
-// The module beside native AVX2: node measure.mjs ROOT WASM PRESS BUNDLE..., where PRESS is press.c, built. One thread, three corrections a step, the
+// The module beside native AVX2: node measure.mjs ROOT WASM PRESS PAGE BUNDLE..., where PRESS is press.c, built, and PAGE has the markers
+// `begin: web` and `end: web`, between which the table goes (tests/docs/results.py run web). One thread, three corrections a step, the
 // library's own time of each step. The two take turns; the first turn of each is not counted.
 import { execFileSync } from "node:child_process";
-import { readFileSync, readdirSync } from "node:fs";
+import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { cpus, loadavg } from "node:os";
-import { basename, join } from "node:path";
+import { basename, join, resolve } from "node:path";
 import { press } from "./press.mjs";
 
 const TURNS = 12;
 const STEPS = 40;
 
-const [root, wasm, program, ...bundles] = process.argv.slice(2);
-const { load } = await import(join(root, "web/src/index.js"));
+const [root, wasm, program, page, ...bundles] = process.argv.slice(2);
+const { load } = await import(resolve(root, "web/src/index.js"));
 const compiled = await WebAssembly.compile(readFileSync(wasm));
 
 function native(bundle) {
@@ -20,7 +21,11 @@ function native(bundle) {
 
 const quantile = (list, share) => [...list].sort((a, b) => a - b)[Math.min(Math.floor(share * list.length), list.length - 1)];
 
-console.log(`${cpus()[0].model}, load ${loadavg()[0].toFixed(1)}; ${TURNS - 1} turns of ${STEPS} steps; ms: median, 99 %`);
+console.log(`${cpus()[0].model}, load ${loadavg()[0].toFixed(1)}; ${TURNS - 1} turns of ${STEPS} steps`);
+let table = `
+| bundle | nodes | native, ms: median, 99 % | WebAssembly, ms | ratio of medians (of ${TURNS - 1} turns) | memory |
+|---|---:|---:|---:|---:|---:|
+`;
 for (const bundle of bundles) {
   const upt = await load({ wasm: compiled });
   const files = readdirSync(bundle).filter((name) => !name.startsWith("certificate"));
@@ -36,7 +41,13 @@ for (const bundle of bundles) {
     times.wasm.push(...here);
     ratios.push(quantile(here, 0.5) / quantile(there, 0.5));
   }
-  const told = Object.entries(times).map(([name, list]) => `${name} ${quantile(list, 0.5).toFixed(2)}, ${quantile(list, 0.99).toFixed(2)}`);
-  const spread = [0, 0.5, 1].map((share) => quantile(ratios, share).toFixed(2));
-  console.log(`${basename(bundle)}, ${model.info.node_count} nodes: ${told.join("; ")}; ratio of a turn's medians ${spread[1]} (${spread[0]} to ${spread[2]}); memory ${(upt.module.memoryBytes / 2 ** 20).toFixed(0)} MiB`);
+  const told = Object.values(times).map((list) => [0.5, 0.99].map((share) => quantile(list, share).toPrecision(3)).join(", "));
+  const [least, ratio, most] = [0, 0.5, 1].map((share) => quantile(ratios, share).toFixed(1));
+  const nodes = model.info.node_count.toLocaleString("en");
+  const memory = (upt.module.memoryBytes / 2 ** 20).toFixed(0);
+  table += `| \`${basename(bundle)}\` | ${nodes} | ${told.join(" | ")} | ${ratio} (${least} to ${most}) | ${memory} MiB |\n`;
 }
+console.log(table);
+const text = readFileSync(page, "utf8");
+const [begin, end] = ["<!-- begin: web -->\n", "<!-- end: web -->"];
+writeFileSync(page, text.slice(0, text.indexOf(begin) + begin.length) + table + "\n" + text.slice(text.indexOf(end)));
