@@ -101,6 +101,19 @@ pkg_config_build() {
 }
 check pkg_config_build pkg_config_build
 check pkg_config_example "$work/minimal-pc" "$bundle" 20
+# The first page for C as the archive has it, word for word, with nothing but the archive.
+page="$prefix/share/doc/upt/docs/guide/c.md"
+block() { awk -v begin='```'"$1" '/^```/ { inside = $0 == begin && !seen++; next } inside' "$page"; }
+first_page() {
+  mkdir -p "$work/first" && cd "$work/first" || return 1
+  block cmake >CMakeLists.txt
+  block 'c complete' >first.c
+  cmake -S . -B build -DCMAKE_PREFIX_PATH="$prefix" && cmake --build build || return 1
+  build/first "$prefix/share/upt/bundles/brain" | grep 'force  *-*[1-9]' || return 1
+  block sh >first.sh
+  PREFIX="$prefix" bash -euo pipefail first.sh | grep 'force  *-*[1-9]'
+}
+check first_page first_page
 check doctor "$prefix/bin/upt" doctor "$bundle"
 
 unity_complete() {
