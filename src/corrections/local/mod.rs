@@ -121,6 +121,8 @@ pub struct LocalSolver {
     pub(super) moved_mm: f32,
     /// Root mean square over the nodes that the last smoothing of the far ones moved, mm.
     pub(super) far_mm: f32,
+    /// Farthest that a far node has gone since the base, mm.
+    pub(super) far_moved_mm: f32,
     partial: PartialSums,
     room: Room,
     on_modes: Vec<f32>,
@@ -169,6 +171,7 @@ impl LocalSolver {
             det: 1.0,
             moved_mm: 0.0,
             far_mm: 0.0,
+            far_moved_mm: 0.0,
             partial: PartialSums::with_room(3 * env.body.mass.len(), 1)?,
             room: Room {
                 q: memory::zeros(width, WHAT)?,
@@ -350,7 +353,8 @@ impl LocalSolver {
         Ok(det.min(far_det).min(self.far_det))
     }
 
-    /// The whole field into `u`, which holds the base, of which `residual` is; `scratch [K,3]`. Leaves what the far nodes were smoothed by in `far_mm`.
+    /// The whole field into `u`, which holds the base, of which `residual` is; `scratch [K,3]`. Leaves what the far nodes were smoothed by in `far_mm`,
+    /// and how far one has gone at most in `far_moved_mm`.
     pub(super) fn settle(
         &mut self,
         step: &mut StepContext<'_>,
@@ -367,9 +371,13 @@ impl LocalSolver {
             add(1.0, t, &mut scratch[3 * node..][..3]);
         }
         let (near, count) = (&self.near, u.len() / 3);
-        let fields = (residual, scratch, u);
+        let fields = (residual, &mut *scratch, u);
         let moved = add_smoothed(env, fields, |node| near.holds(node), &mut self.partial)?;
         self.far_mm = (moved / count.max(1) as f64).sqrt() as f32;
+        let changes = scratch.as_chunks::<3>().0.iter().zip(0..);
+        let far = changes.filter(|(_, node)| !near.holds(*node));
+        let squares = far.map(|(change, _)| change.iter().map(|x| x * x).sum::<f32>());
+        self.far_moved_mm = squares.fold(0.0, f32::max).sqrt();
         Ok(())
     }
 }

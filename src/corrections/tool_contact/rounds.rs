@@ -15,8 +15,10 @@ const ROUND: u32 = 16;
 
 /// Whole modes may move the tissue so far after the iterations without an evaluation of what that leaves, mm.
 const FAR_MM: f32 = 0.2;
-/// Where an iteration's smallest det F is below this, all elements are evaluated once more where it ends.
+/// Where an iteration's smallest det F is below this, all elements are evaluated once more where it ends; and where a far node has gone
+/// farther than this since the base, mm: of the far elements the iterations know the mean of their clusters alone.
 const LOOKED_AT_DET: f32 = 0.5;
+const LOOKED_AT_MM: f32 = 2.0;
 
 /// What the iterations of a step have made.
 #[derive(Default)]
@@ -61,8 +63,8 @@ impl ImplicitSolver {
             }
             self.evaluate(context, input, at, report)?;
         }
-        if at.det < LOOKED_AT_DET {
-            // What the far elements have come to since the base is known of their clusters alone.
+        let far_moved_mm = self.local.as_ref().map_or(0.0, |local| local.far_moved_mm);
+        if at.det < LOOKED_AT_DET || far_moved_mm > LOOKED_AT_MM {
             self.evaluate(context, input, at, report)?;
         }
         report.residual = (made.size / made.start.max(f64::MIN_POSITIVE)) as f32;
