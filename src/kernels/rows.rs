@@ -16,7 +16,7 @@ use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
 
 pub(super) use some::add_copies;
-pub use some::project_rows;
+pub use some::{project_products, project_rows};
 
 /// Numbers stored as f32 or f16.
 #[derive(Debug, Clone, Copy)]
@@ -108,6 +108,8 @@ pub struct RowPlan {
     locals: Vec<u32>,
     /// Node's row in the output.
     outputs: Vec<u32>,
+    /// Of each output row of a refilled plan: the node's block, and its place there.
+    places: Vec<[u32; 2]>,
     /// Start of each block's basis; `[B + 1]`.
     basis_offsets: Vec<usize>,
     output_rows: usize,
@@ -179,6 +181,7 @@ impl RowPlan {
             runs: memory::room(blocks + nodes.len() / RUN_NODES, WHAT)?,
             locals: memory::room(nodes.len(), WHAT)?,
             outputs: memory::room(nodes.len(), WHAT)?,
+            places: Vec::new(),
         };
         for k in 0..basis.block_offsets.len() - 1 {
             let range = basis.block_offsets[k] as usize..basis.block_offsets[k + 1] as usize;

@@ -3,7 +3,7 @@
 use super::linear::WHAT;
 use super::near::NearSet;
 use super::pairs::Room;
-use super::step::{add, resize};
+use super::step::add;
 use crate::corrections::far::{FarField, NINE};
 use crate::corrections::precondition::{Env, Preconditioner};
 use crate::error::Result;
@@ -80,20 +80,8 @@ impl Clusters {
             let Some(part) = part else {
                 continue;
             };
-            let field = 3 * near.free;
-            resize(&mut room.linear, 3 * modes)?;
-            for j in 0..3 {
-                resize(&mut room.field, 3 * field)?;
-                for &(place, weight) in near.parts.weights(part) {
-                    for i in 0..3 {
-                        room.field[i * field + 3 * place as usize + i] = weight[j];
-                    }
-                }
-                room.on_modes(env, (near, preconditioner), 3)?;
-                for (i, part) in room.linear.chunks_exact(modes.max(1)).enumerate() {
-                    add(-1.0, part, &mut own[(3 * i + j) * modes..][..modes]);
-                }
-            }
+            room.products_on_modes(env, (near, preconditioner), near.parts.weights(part))?;
+            add(-1.0, &room.linear, own);
         }
         Ok(())
     }

@@ -14,6 +14,7 @@
 //! The field is decoded once, at the end, when the far nodes get the preconditioner's first level of the base. `docs/decisions/023-local-iterations.md` says
 //! what was tried.
 
+mod centres;
 mod clusters;
 mod columns;
 mod factor;
@@ -42,8 +43,9 @@ use crate::error::Result;
 use crate::kernels::vectors::PartialSums;
 use crate::memory::{self, HeldBytes};
 
+pub(super) use self::centres::add_centres;
 pub use self::linearisation::Linearisation;
-pub(super) use self::near::{LEVELS, add_centres};
+pub(super) use self::near::LEVELS;
 pub use self::record::Record;
 
 /// Far elements of a chunk that is near in part are looked at where its smallest det F is below this.

@@ -8,11 +8,12 @@ use std::ops::Range;
 
 use ::elements::{ElementForces, Subset};
 
+use super::centres::{add_centres, is_by, nearest_squared};
 use super::linear::{LinearElements, Parts, WHAT};
 use crate::corrections::far::FarField;
 use crate::corrections::precondition::Env;
 use crate::error::Result;
-use crate::kernels::rows::{RowPlan, decode_rows, project_rows};
+use crate::kernels::rows::{RowPlan, decode_rows, project_products, project_rows};
 use crate::memory::{self, HeldBytes};
 
 /// Nodes are near that lie this close to a centre at rest, mm, or as many mean edges of the mesh.
@@ -28,8 +29,7 @@ const MOST_NODES: usize = 4500;
 /// Where a larger part of the nodes would be near, all are, and so they are in a body of fewer nodes: whole, it costs no more than its modes do.
 const LARGEST_PART: f32 = 0.5;
 const FEWEST_NODES: usize = 1000;
-/// Centres lie this far apart at least, and a set goes on as long as what the tools touch lies that close to them, mm.
-const APART_MM: f32 = 3.0;
+/// A set goes on as long as what the tools touch lies that close to its centres, mm.
 const SLACK_MM: f32 = 5.0;
 /// A centre is left out that lies this far from all that is touched, mm.
 const LEFT_MM: f32 = 12.0;
@@ -352,6 +352,30 @@ impl NearSet {
         }
         project_rows(env.isa, &env.prior.basis(), &self.plan, r, q);
     }
+
+    /// Adds `U^T (e_i w_j)` of vectors `w` at some places to `q [9,Q]`, field `3 i + j`.
+    pub fn project_products(&self, env: Env<'_>, vectors: &[(u32, [f32; 3])], q: &mut [f32]) {
+        project_products(env.isa, &env.prior.basis(), &self.plan, vectors, q);
+    }
+
+    /// Coordinates of the blocks that some places are of.
+    pub fn ranges_of(
+        &self,
+        env: Env<'_>,
+        vectors: &[(u32, [f32; 3])],
+        ranges: &mut Vec<Range<usize>>,
+    ) -> Result<()> {
+        let offsets = env.prior.basis().rank_offsets;
+        ranges.clear();
+        for (place, _) in vectors {
+            let block = self.plan.block_of(*place);
+            let own = offsets[block] as usize..offsets[block + 1] as usize;
+            if !ranges.contains(&own) {
+                memory::push(ranges, own, WHAT)?;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The level of the next step, whose set is wider where the far nodes are out of balance: they were smoothed by `far_mm`, the touched ones have
@@ -362,39 +386,4 @@ pub(in crate::corrections) fn next_level(level: usize, far_mm: f32, pushed_mm: f
         true => (level + 1).min(LEVELS - 1),
         false => level,
     }
-}
-
-/// The square of the distance from a node to the nearest of some nodes at rest, mm².
-fn nearest_squared(rest: &[f32], nodes: &[u32], node: u32) -> f32 {
-    let at = |node: u32| &rest[3 * node as usize..][..3];
-    let own = at(node);
-    let squares = nodes.iter().map(|&other| {
-        let apart = own.iter().zip(at(other)).map(|(a, b)| (a - b) * (a - b));
-        apart.sum::<f32>()
-    });
-    squares.fold(f32::MAX, f32::min)
-}
-
-/// Whether one of some nodes lies within a distance of a node at rest.
-fn is_by(rest: &[f32], nodes: &[u32], node: u32, distance: f32) -> bool {
-    let at = |node: u32| &rest[3 * node as usize..][..3];
-    let own = at(node);
-    nodes.iter().any(|&other| {
-        let apart = own.iter().zip(at(other)).map(|(a, b)| (a - b) * (a - b));
-        apart.sum::<f32>() < distance * distance
-    })
-}
-
-/// Adds those nodes that do not lie by one of the centres.
-pub(in crate::corrections) fn add_centres(
-    rest: &[f32],
-    nodes: &[u32],
-    centres: &mut Vec<u32>,
-) -> Result<()> {
-    for &node in nodes {
-        if !is_by(rest, centres, node, APART_MM) {
-            memory::push(centres, node, WHAT)?;
-        }
-    }
-    Ok(())
 }

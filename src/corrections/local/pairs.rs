@@ -289,9 +289,9 @@ impl Pairs {
 /// Scratch of a layout.
 #[derive(Debug, Default, HeldBytes)]
 pub(in crate::corrections) struct Room {
-    /// Coordinates `[Q]`, of the near blocks alone, and those of three fields `[3,Q]`.
+    /// Coordinates `[Q]`, of the near blocks alone, and those of nine fields `[9,Q]`.
     pub q: Vec<f32>,
-    pub three: Vec<f32>,
+    pub nine: Vec<f32>,
     /// A field by place, or three at the free nodes; and one at those, or what three have of the modes.
     pub field: Vec<f32>,
     pub linear: Vec<f32>,
@@ -308,10 +308,10 @@ impl Room {
         count: usize,
     ) -> Result<()> {
         let size = self.q.len();
-        if self.three.len() != 3 * size {
-            resize(&mut self.three, 3 * size)?;
+        if self.nine.len() != 9 * size {
+            resize(&mut self.nine, 9 * size)?;
         }
-        let three = &mut self.three[..count * size];
+        let three = &mut self.nine[..count * size];
         let fields = self.field.chunks_exact((3 * near.free).max(1));
         for (field, q) in fields.zip(three.chunks_exact_mut(size)) {
             near.project(env, field, q);
@@ -325,6 +325,29 @@ impl Room {
         self.used
             .extend(near.ranges.iter().filter(is_used).cloned());
         preconditioner.on_modes_in(env, &self.used, three, &mut self.linear);
+        Ok(())
+    }
+
+    /// `linear [9,r] = Phi^T (e_i w_j)`, field `3 i + j`, of vectors `w` at some places.
+    pub fn products_on_modes(
+        &mut self,
+        env: Env<'_>,
+        (near, preconditioner): (&NearSet, &Preconditioner),
+        vectors: &[(u32, [f32; 3])],
+    ) -> Result<()> {
+        let size = self.q.len();
+        if self.nine.len() != 9 * size {
+            resize(&mut self.nine, 9 * size)?;
+        }
+        near.ranges_of(env, vectors, &mut self.used)?;
+        for q in self.nine.chunks_exact_mut(size) {
+            for range in &self.used {
+                q[range.clone()].fill(0.0);
+            }
+        }
+        near.project_products(env, vectors, &mut self.nine);
+        resize(&mut self.linear, 9 * env.space.count())?;
+        preconditioner.on_modes_in(env, &self.used, &self.nine, &mut self.linear);
         Ok(())
     }
 }

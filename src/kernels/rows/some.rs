@@ -24,6 +24,9 @@ impl RowPlan {
         self.output_rows = rows;
         memory::fit(&mut self.locals, rows, WHAT)?;
         memory::fit(&mut self.outputs, rows, WHAT)?;
+        self.places.clear();
+        memory::fit(&mut self.places, rows, WHAT)?;
+        self.places.resize(rows, [0; 2]);
         let blocks = basis.block_offsets.len() - 1;
         memory::fit(&mut self.runs, blocks + rows / RUN_NODES, WHAT)?;
         for k in 0..blocks {
@@ -31,8 +34,10 @@ impl RowPlan {
             let mut start = self.locals.len();
             for (local, &node) in basis.block_nodes[range].iter().enumerate() {
                 if let Some(row) = row_of(node) {
-                    self.locals.push(basis.row_of(k, local));
+                    let local = basis.row_of(k, local);
+                    self.locals.push(local);
                     self.outputs.push(row);
+                    self.places[row as usize] = [k as u32, local];
                     if self.locals.len() - start == RUN_NODES {
                         self.end_run(k, &mut start);
                     }
@@ -41,6 +46,11 @@ impl RowPlan {
             self.end_run(k, &mut start);
         }
         Ok(())
+    }
+
+    /// The block of an output row of a refilled plan.
+    pub fn block_of(&self, row: u32) -> usize {
+        self.places[row as usize][0] as usize
     }
 
     /// The blocks that the plan's nodes are of, ascending.
@@ -76,6 +86,109 @@ pub fn project_rows(isa: Isa, basis: &BlockBasis<'_>, plan: &RowPlan, r: &[f32],
         match basis.basis {
             Stored::F32(basis) => add_f32(isa, &basis[range], locals, outputs, r, q),
             Stored::F16(basis) => add_f16(isa, &basis[range], locals, outputs, r, q),
+        }
+    }
+}
+
+/// `q += U^T r` for the nine fields `r = e_i w_j` of some rows of a refilled plan, each with a vector `w`: `q [9,Q]`, field `3 i + j`.
+///
+/// # Panics
+/// If a length does not match the plan.
+pub fn project_products(
+    isa: Isa,
+    basis: &BlockBasis<'_>,
+    plan: &RowPlan,
+    of_rows: &[(u32, [f32; 3])],
+    q: &mut [f32],
+) {
+    let ranks = basis.rank_offsets;
+    assert_eq!(
+        q.len(),
+        9 * ranks[ranks.len() - 1] as usize,
+        "q must be [9,Q]"
+    );
+    let isa = if isa == Isa::Avx512 { Isa::Avx2 } else { isa };
+    let table = (plan.places.as_slice(), plan.basis_offsets.as_slice());
+    match basis.basis {
+        Stored::F32(basis) => products_f32(isa, basis, table, ranks, of_rows, q),
+        Stored::F16(basis) => products_f16(isa, basis, table, ranks, of_rows, q),
+    }
+}
+
+by_isa! {
+    fn products_f32(basis: &[f32], table: (&[[u32; 2]], &[usize]), ranks: &[u32], of_rows: &[(u32, [f32; 3])], q: &mut [f32]) = products_body, products_scalar;
+}
+by_isa! {
+    fn products_f16(basis: &[f16], table: (&[[u32; 2]], &[usize]), ranks: &[u32], of_rows: &[(u32, [f32; 3])], q: &mut [f32]) = products_body, products_scalar;
+}
+
+fn products_scalar<T: Number>(
+    basis: &[T],
+    table: (&[[u32; 2]], &[usize]),
+    ranks: &[u32],
+    of_rows: &[(u32, [f32; 3])],
+    q: &mut [f32],
+) {
+    each_product(basis, table, ranks, of_rows, q, |row, w, q| {
+        for (q, b) in q.iter_mut().zip(row) {
+            *q += w * b.wide();
+        }
+    });
+}
+
+#[inline(always)]
+#[allow(clippy::extra_unused_type_parameters)]
+unsafe fn products_body<V: DenseLanes>(
+    basis: &[impl Number],
+    table: (&[[u32; 2]], &[usize]),
+    ranks: &[u32],
+    of_rows: &[(u32, [f32; 3])],
+    q: &mut [f32],
+) {
+    each_product(
+        basis,
+        table,
+        ranks,
+        of_rows,
+        q,
+        #[inline(always)]
+        |row, w, q| {
+            assert!(
+                row.len().is_multiple_of(V::COUNT),
+                "rank must be whole registers"
+            );
+            for (q, row) in q.chunks_exact_mut(V::COUNT).zip(row.chunks_exact(V::COUNT)) {
+                // SAFETY: both are as long as a register.
+                unsafe {
+                    let (from, to) = (row.as_ptr(), q.as_mut_ptr());
+                    let sum = Number::lanes::<V>(from).mul_add(V::splat(w), V::load(to));
+                    sum.store(to);
+                }
+            }
+        },
+    );
+}
+
+/// Calls with each row of the basis, each component of its vector and the coordinates that their product goes to.
+#[inline(always)]
+fn each_product<T: Number>(
+    basis: &[T],
+    (places, starts): (&[[u32; 2]], &[usize]),
+    ranks: &[u32],
+    of_rows: &[(u32, [f32; 3])],
+    q: &mut [f32],
+    mut take: impl FnMut(&[T], f32, &mut [f32]),
+) {
+    let all = q.len() / 9;
+    for (row, vector) in of_rows {
+        let [block, local] = places[*row as usize].map(|at| at as usize);
+        let [start, end] = [ranks[block], ranks[block + 1]].map(|at| at as usize);
+        let rank = end - start;
+        for i in 0..3 {
+            let row = &basis[starts[block] + (3 * local + i) * rank..][..rank];
+            for (j, w) in vector.iter().enumerate() {
+                take(row, *w, &mut q[(3 * i + j) * all + start..][..rank]);
+            }
         }
     }
 }

@@ -140,3 +140,33 @@ fn a_region_has_the_bits_of_the_whole() {
         }
     }
 }
+
+#[test]
+fn products_of_rows_are_projected_like_the_fields_that_they_are() {
+    let case = case();
+    let wanted = [3u32, 17, 18, 250, 699];
+    let row_of = |node: u32| wanted.iter().position(|w| *w == node).map(|row| row as u32);
+    let vectors = [
+        (0, [0.5, -1.0, 2.0]),
+        (3, [1.5, 0.0, -0.25]),
+        (4, [-3.0, 0.75, 1.0]),
+    ];
+    for f16 in [false, true] {
+        let basis = case.basis(f16);
+        let mut plan = RowPlan::region(&basis, &[], true);
+        plan.refill(&basis, wanted.len(), row_of).unwrap();
+        for isa in Isa::available() {
+            let mut products = vec![0.0; 9 * case.q.len()];
+            project_products(isa, &basis, &plan, &vectors, &mut products);
+            for (number, found) in products.chunks_exact(case.q.len()).enumerate() {
+                let mut field = vec![0.0; 3 * wanted.len()];
+                for (row, w) in vectors {
+                    field[3 * row as usize + number / 3] = w[number % 3];
+                }
+                let mut q = vec![0.0; case.q.len()];
+                project_rows(isa, &basis, &plan, &field, &mut q);
+                assert!(max_error(&q, found) < 1e-5, "{} field {number}", isa.name());
+            }
+        }
+    }
+}
