@@ -6,17 +6,20 @@
 //! the cores. Only while a caller holds [`Pool::keep_awake`], for the few milliseconds of many short jobs
 //! in a row, does a worker look for the next one for `worker::LOOKS` turns before it sleeps. `run` allocates
 //! nothing. A worker that wakes late finds the job closed and goes back to sleep, so `run` never waits
-//! for a thread that has not started.
+//! for a thread that has not started. Where workers do not make what is done under [`Pool::keep_awake`] shorter, they are left out of it (`turns`).
 
+mod turns;
 mod worker;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
+use crate::clock::Instant;
 use crate::error::Error;
 use lanes::{FlushToZero, Isa};
+use turns::Turns;
 use worker::{Job, Shared, Task, panic_message, worker_loop};
 
 /// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs what
@@ -62,6 +65,9 @@ pub struct Pool {
     workers: Vec<JoinHandle<()>>,
     /// Held by the caller whose job the workers run.
     submit: Mutex<()>,
+    turns: Mutex<Turns>,
+    /// A caller under [`Pool::keep_awake`] leaves the workers out.
+    is_alone: AtomicBool,
     /// Of the kernels that it runs: the floating-point mode is theirs.
     isa: Isa,
 }
@@ -85,6 +91,8 @@ impl Pool {
             shared,
             workers: Vec::new(),
             submit: Mutex::new(()),
+            turns: Mutex::new(Turns::default()),
+            is_alone: AtomicBool::new(false),
             isa,
         };
         let count = threads.saturating_sub(1);
@@ -124,7 +132,8 @@ impl Pool {
             Err(std::sync::TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
             Err(std::sync::TryLockError::WouldBlock) => None,
         };
-        if chunk_count <= 1 || self.workers.is_empty() || submit.is_none() {
+        let is_alone = self.workers.is_empty() || self.is_alone.load(Ordering::Relaxed);
+        if chunk_count <= 1 || is_alone || submit.is_none() {
             return run_alone(chunk_count, task);
         }
         let shared = &*self.shared;
@@ -172,20 +181,39 @@ impl Pool {
     }
 }
 
-/// Workers stay awake between jobs while this lives.
-pub struct Awake<'a>(&'a Shared);
+/// Workers stay awake between jobs while this lives, or are left out of them.
+pub struct Awake<'a> {
+    pool: &'a Pool,
+    /// Of the first of several at once, whose time is taken.
+    start: Option<Instant>,
+}
 
 impl Drop for Awake<'_> {
     fn drop(&mut self) {
-        self.0.awake.fetch_sub(1, Ordering::Relaxed);
+        let pool = self.pool;
+        if let Some(start) = self.start {
+            let is_alone = pool.is_alone.swap(false, Ordering::Relaxed);
+            pool.turns().take(is_alone, start.elapsed());
+        }
+        pool.shared.awake.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
 impl Pool {
-    /// Keeps workers from going to sleep between the short jobs of the next milliseconds.
+    /// Keeps workers from going to sleep between the short jobs of the next milliseconds. Where they have been of no use in the last of these, beside
+    /// busy threads of others, these jobs are the caller's alone: the same bits.
     pub fn keep_awake(&self) -> Awake<'_> {
-        self.shared.awake.fetch_add(1, Ordering::Relaxed);
-        Awake(&self.shared)
+        let is_first = self.shared.awake.fetch_add(1, Ordering::Relaxed) == 0;
+        let start = (is_first && !self.workers.is_empty()).then(|| {
+            let is_alone = self.turns().next_is_alone();
+            self.is_alone.store(is_alone, Ordering::Relaxed);
+            Instant::now()
+        });
+        Awake { pool: self, start }
+    }
+
+    fn turns(&self) -> std::sync::MutexGuard<'_, Turns> {
+        self.turns.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// As [`Pool::run`], for a job that does little but read `bytes` of a table: a small one stays on the
