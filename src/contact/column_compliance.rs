@@ -60,7 +60,7 @@ impl ColumnCompliance {
     /// Reads the columns that `rows` samples need, unless they are there. Tells whether it has become that of another tissue or length of step.
     ///
     /// # Errors
-    /// [`crate::Error::OutOfMemory`]; it knows no column then.
+    /// [`crate::Error::OutOfMemory`]; it knows no column then, or those that it had.
     pub fn gather(
         &mut self,
         compliance: Compliance<'_>,

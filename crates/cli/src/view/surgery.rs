@@ -21,8 +21,9 @@ const STILL_MM: f32 = 0.02;
 const RATE: f64 = 500.0;
 /// What coagulation multiplies stiffness by, once an element.
 const HARDER: f32 = 4.0;
-/// Strokes that can be undone.
+/// Strokes that can be undone, and the bytes that bodies before them hold: the last one stays, however large.
 const MOST_UNDONE: usize = 16;
+const MOST_UNDONE_BYTES: usize = 64 << 20;
 
 /// What all strokes so far have done.
 #[derive(Clone, Copy, Debug, Default)]
@@ -37,6 +38,21 @@ struct Before {
     snapshot: Vec<u8>,
     account: Account,
     hard: Vec<bool>,
+}
+
+impl Before {
+    fn bytes(&self) -> usize {
+        self.snapshot.len() + self.hard.len()
+    }
+}
+
+/// Adds a body, and forgets the oldest beyond what may be kept.
+fn keep(undone: &mut Vec<Before>, before: Before) {
+    undone.push(before);
+    let bytes = |undone: &[Before]| undone.iter().map(Before::bytes).sum::<usize>();
+    while undone.len() > 1 && (undone.len() > MOST_UNDONE || bytes(undone) > MOST_UNDONE_BYTES) {
+        undone.remove(0);
+    }
 }
 
 pub struct Surgery {
@@ -190,10 +206,7 @@ impl Surgery {
         self.changed = true;
         self.effective = true;
         if let Some(before) = self.pending.take() {
-            if self.undone.len() == MOST_UNDONE {
-                self.undone.remove(0);
-            }
-            self.undone.push(before);
+            keep(&mut self.undone, before);
         }
     }
 
@@ -366,5 +379,22 @@ mod tests {
         let edge = |at: [f32; 3]| [at, [at[0], at[1], at[2] + 20.0]];
         assert!(swept(&[edge([0.0; 3]), edge([0.0, 0.0, 3.0])]) < 1e-4);
         assert!((swept(&[edge([0.0; 3]), edge([3.0, 0.0, 0.0])]) - 60.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn bodies_before_strokes_hold_no_more_than_their_room() {
+        let before = |bytes: usize| Before {
+            snapshot: vec![0; bytes],
+            account: Account::default(),
+            hard: Vec::new(),
+        };
+        let kept = |bytes: usize, count: usize| {
+            let mut undone = Vec::new();
+            (0..count).for_each(|_| keep(&mut undone, before(bytes)));
+            undone.len()
+        };
+        assert_eq!(kept(1000, 20), MOST_UNDONE);
+        assert_eq!(kept(MOST_UNDONE_BYTES / 3, 9), 3);
+        assert_eq!(kept(MOST_UNDONE_BYTES + 1, 2), 1);
     }
 }
