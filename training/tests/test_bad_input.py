@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from upt_training.dataset import open_dataset
 from upt_training.errors import InputError
 from upt_training.evaluate import check_tissue
 from upt_training.mesh_file import load_mesh
+from upt_training.trainer import load_checkpoint
 
 
 def run(data, mesh, out, *more):
@@ -120,6 +122,22 @@ def test_broken_checkpoint(tmp_path, mesh_path, capsys):
     code = main(["export", str(tmp_path), "--out", str(tmp_path / "bundle"), "--mesh", str(mesh_path)])
     expect(capsys, code, "last.pt")
     assert not (tmp_path / "bundle").exists()
+
+
+class Code:
+    def __init__(self, target):
+        self.target = target
+
+    def __reduce__(self):
+        return (Path.touch, (self.target,))
+
+
+def test_a_checkpoint_with_code_in_it_runs_none(tmp_path):
+    target = tmp_path / "ran"
+    torch.save({"format": "upt-checkpoint", "model": Code(target)}, tmp_path / "last.pt")
+    with pytest.raises(InputError, match=r"last\.pt: not a readable checkpoint"):
+        load_checkpoint(tmp_path / "last.pt")
+    assert not target.exists()
 
 
 def test_element_stiffness_is_kept_hashed_and_checked(tmp_path):

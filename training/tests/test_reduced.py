@@ -246,7 +246,7 @@ def test_the_bundle_runs_as_it_was_trained(phantom, bundle):
     mesh, _, folder = phantom
     out, work = bundle
     states = load_states(work / "states-data.npz")
-    saved = torch.load(work / "training-1.pt", weights_only=False)["best"]
+    saved = torch.load(work / "training-1.pt", weights_only=True)["best"]
     model = Correction(states.modes, states.z.shape[2], 48)
     model.load_state_dict(saved)
     manifest = json.loads((out / "bundle.json").read_text())

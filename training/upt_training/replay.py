@@ -56,16 +56,16 @@ class ReplayPool:
 
     def state_dict(self) -> dict:
         return {
-            "case": self.case,
-            "frame": self.frame,
+            "case": torch.from_numpy(self.case),
+            "frame": torch.from_numpy(self.frame),
             "u": self.u.cpu(),
             "previous": self.previous.cpu(),
             "next": self.next,
         }
 
     def load_state_dict(self, values: dict) -> None:
-        for name, value in values.items():
-            setattr(self, name, value.to(self.device) if isinstance(value, torch.Tensor) else value)
+        self.case, self.frame, self.next = values["case"].numpy(), values["frame"].numpy(), values["next"]
+        self.u, self.previous = values["u"].to(self.device), values["previous"].to(self.device)
 
 
 def corrupt(

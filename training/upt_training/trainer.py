@@ -248,7 +248,7 @@ class Trainer:
             },
             "step_count": self.step_count,
             "core_seconds": self.core_seconds,
-            "best": self.best,
+            "best": float(self.best),
             "stale": self.stale,
         }
         torch.save(state, self.folder / (name + ".tmp"))
@@ -331,7 +331,7 @@ def load_checkpoint(path: Path) -> dict:
     if not path.exists():
         raise InputError(f"{path}: no such checkpoint")
     try:
-        state = torch.load(path, map_location="cpu", weights_only=False)
+        state = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:
         raise InputError(f"{path}: not a readable checkpoint ({error}); use the one before it") from error
     if not isinstance(state, dict) or state.get("format") != "upt-checkpoint":

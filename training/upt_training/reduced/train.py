@@ -158,7 +158,7 @@ def train(
     done, started, history, running = 0, time.monotonic(), [], []
     first = 0
     if checkpoint and checkpoint.exists():
-        saved = torch.load(checkpoint, weights_only=False)
+        saved = torch.load(checkpoint, weights_only=True)
         model.load_state_dict(saved["model"])
         average.load_state_dict(saved["average"])
         best.load_state_dict(saved["best"])
