@@ -991,7 +991,7 @@ typedef struct upt_input {
    */
   float gravity[3];
   /**
-   * Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.
+   * Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node. Zeros: the bundle's, where `gravity` is not zero.
    */
   float gravity_at_rest[3];
   /**
@@ -2066,7 +2066,7 @@ upt_status upt_scene_bed(struct upt_scene *scene,
  *
  * The scene has more nodes then (`out->node_count`): those that there were keep their numbers, and outputs have `3 * node_count` floats. The elements make each step from then on,
  * with instruments, nodes, loads or without. Frames between steps, regions, attached points (each goes with the side on which it lies) and haptics go on. A step that
- * starts from a displacement, and a support that moves, are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
+ * starts from a displacement is `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
  *
  * - `stroke`: calls with the same number are one blade that goes on; another number cuts anew.
  * - `points`: `[pose_count, edge_count, 3]`, mm: the edge as a line of points, at each pose.

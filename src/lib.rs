@@ -95,8 +95,9 @@ pub use library::{init, shutdown};
 pub use model::{Kind, Model, ModelInfo};
 pub use onnx::providers_json;
 pub use options::{
-    Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, LONGEST_STEP_S, ModelOptions,
-    Precision, Provider, SHORTEST_STEP_S, SceneOptions, StepPath, UserStream,
+    Corrections, DecoderKernel, GuardPolicy, IndexSet, InitOptions, LARGEST_GRAVITY,
+    LONGEST_STEP_S, ModelOptions, Precision, Provider, SHORTEST_STEP_S, SceneOptions, StepPath,
+    UserStream,
 };
 pub use scene::{
     Bed, Blade, Contact, Cut, CutSurface, GroupMotion, Loads, MAX_PRESSURES, MAX_SUPPORTS,

@@ -234,6 +234,8 @@ pub(crate) const MOST_SUBSTEPS: u32 = 8;
 pub const SHORTEST_STEP_S: f64 = 0.01;
 /// See [`SHORTEST_STEP_S`].
 pub const LONGEST_STEP_S: f64 = 0.05;
+/// The largest gravity, in each direction, m/s².
+pub const LARGEST_GRAVITY: f32 = 1e3;
 /// Bounds of [`SceneOptions::damping_per_s`], 1/s.
 pub const SMALLEST_DAMPING_PER_S: f64 = 0.01;
 /// See [`SMALLEST_DAMPING_PER_S`].

@@ -846,7 +846,7 @@ class Input(Record):
     gravity: tuple[float, ...] = vector("_gravity")
     """Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction."""
     gravity_at_rest: tuple[float, ...] = vector("_gravity_at_rest")
-    """Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node."""
+    """Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node. Zeros: the bundle's, where `gravity` is not zero."""
     support_position: tuple[float, ...] = vector("_support_position")
     """Where what holds the body is at the end of the step, mm: a point `x` of the mesh's frame is at `R x + support_position` in the world. All else stays in
     the mesh's frame, which goes with the support, but `gravity`, which is the world's then; the body feels the support's motion as inertia. Pass it in every step; a

@@ -6,7 +6,9 @@ use super::faults::{bad, check};
 use super::manifest::{Envelope, Manifest, ManifestKind, ReducedEntry, ToolEnvelope, UptEntry};
 use crate::error::Result;
 use crate::field::INPUT_LIMIT;
-use crate::options::{LONGEST_STEP_S, MOST_CORRECTIONS, MOST_SUBSTEPS, SHORTEST_STEP_S};
+use crate::options::{
+    LARGEST_GRAVITY, LONGEST_STEP_S, MOST_CORRECTIONS, MOST_SUBSTEPS, SHORTEST_STEP_S,
+};
 
 impl Manifest {
     /// Checks each value on its own and against the others. Whether files agree with them is found when they are read.
@@ -31,6 +33,12 @@ impl Manifest {
             (0.0..=1.0).contains(&self.rest_displacement_mm),
             "rest_displacement_mm",
             "must be in [0, 1] mm",
+        )?;
+        let gravity = self.gravity_at_rest_m_s2;
+        check(
+            gravity.iter().all(|g| g.abs() <= LARGEST_GRAVITY),
+            "gravity_at_rest_m_s2",
+            "must be three numbers of at most 1000 m/s²",
         )?;
         check(
             self.precisions.iter().any(|one| one == "f32"),

@@ -5,10 +5,29 @@ use std::sync::OnceLock;
 use topology::{Body, Changes};
 
 use super::mesh::{Mesh, unique};
+use super::node_set::NodeSet;
 use crate::error::Result;
 use crate::memory;
 
 const WHAT: &str = "the mesh of a cut body";
+
+/// What is left of a set of nodes: those that have elements around them, and of the copies those that stem from one of the set.
+fn cut_set(set: &NodeSet, body: &Body, is_left: &dyn Fn(u32) -> bool) -> Result<NodeSet> {
+    let own = body.mesh().node_count() as u32;
+    let (mut nodes, mut rows) = (Vec::new(), Vec::new());
+    let copies = own..body.node_count() as u32;
+    for node in set.nodes.iter().copied().chain(copies) {
+        if let (Ok(row), true) = (set.nodes.binary_search(&body.parent(node)), is_left(node)) {
+            memory::push(&mut nodes, node, WHAT)?;
+            memory::push(&mut rows, row as u32, WHAT)?;
+        }
+    }
+    Ok(NodeSet {
+        name: set.name.clone(),
+        nodes,
+        rows,
+    })
+}
 
 impl Mesh {
     /// This mesh as a body that was made of it is now: copies of nodes behind the mesh's own; elements without those that have changed, and behind them the
@@ -61,6 +80,10 @@ impl Mesh {
                 memory::push(&mut held_nodes, node, WHAT)?;
             }
         }
+        let mut supports = memory::room(self.supports.len(), WHAT)?;
+        for set in &self.supports {
+            supports.push(cut_set(set, body, &is_left)?);
+        }
         let mut node_area = memory::room(count, WHAT)?;
         node_area.extend_from_slice(&self.node_area);
         node_area.resize(count, 0.0);
@@ -73,7 +96,7 @@ impl Mesh {
             domain_faces,
             surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
             held_nodes: unique(held_nodes),
-            supports: Vec::new(),
+            supports,
             regions: Vec::new(),
             node_area,
             sha256: self.sha256.clone(),

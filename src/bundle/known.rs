@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 const REQUIREMENTS: &[&str] = &[
     "anchors",
     "corrections",
+    "gravity_at_rest",
     "law",
     "relaxation",
     "release",
@@ -44,6 +45,7 @@ const KEYS: &[(&str, &[&str])] = &[
             "prior",
             "supports",
             "regions",
+            "gravity_at_rest_m_s2",
             "corrections",
             "upt",
             "reduced",

@@ -60,7 +60,7 @@ impl Corrections {
             body: own,
             time_step: Arc::new(self.time_step.cut(&diagonal, &touched)?),
             changed,
-            groups: Vec::new(),
+            groups: super::group::groups(cut)?,
             gravity: OnceLock::new(),
             diagonal: OnceLock::from(diagonal),
             whole: OnceLock::new(),

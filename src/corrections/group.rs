@@ -20,8 +20,10 @@ pub struct Group {
 pub struct Lift {
     /// `b_j [j][n]`.
     pub(super) functions: Vec<Vec<f32>>,
-    /// `w [3j][3K]`, by function, then axis.
-    pub(super) columns: Vec<Vec<f32>>,
+    /// `w [3j][3K]`, by function, then axis; of a cut body those of the intact one.
+    pub(super) columns: Arc<Vec<Vec<f32>>>,
+    /// Of each copy of a node of a cut body: the node that it stems from, whose answer it has.
+    pub(super) parents: Vec<u32>,
 }
 
 /// What groups do that have been let go.
@@ -66,15 +68,38 @@ impl Group {
 
     /// Adds to a node what those amounts of the columns do there.
     pub fn add(&self, amounts: &[f32], node: u32, u: &mut [f32; 3]) {
-        let columns = self.lift.get().map_or(&[][..], |lift| &lift.columns);
-        for (amount, column) in amounts.iter().zip(columns) {
-            let own = &column[3 * node as usize..][..3];
+        let Some(lift) = self.lift.get() else {
+            return;
+        };
+        for (amount, column) in amounts.iter().zip(&*lift.columns) {
+            let own = lift.row(column, node as usize);
             (u.iter_mut().zip(own)).for_each(|(u, w)| *u += amount * w);
         }
     }
 }
 
 impl Lift {
+    /// What a column does at a node.
+    pub(super) fn row(&self, column: &[f32], node: usize) -> [f32; 3] {
+        let at = match node.checked_sub(column.len() / 3) {
+            Some(copy) => self.parents.get(copy).map_or(0, |parent| *parent as usize),
+            None => node,
+        };
+        [0, 1, 2].map(|axis| column[3 * at + axis])
+    }
+
+    /// Adds so much of a column to a field of all nodes.
+    pub(super) fn add(&self, (column, amount): (&[f32], f32), u: &mut [f32]) {
+        let (own, copies) = u.split_at_mut(column.len().min(u.len()));
+        own.iter_mut()
+            .zip(column)
+            .for_each(|(u, w)| *u += amount * w);
+        for (u, parent) in copies.as_chunks_mut::<3>().0.iter_mut().zip(&self.parents) {
+            let from = &column[3 * *parent as usize..][..3];
+            u.iter_mut().zip(from).for_each(|(u, w)| *u += amount * w);
+        }
+    }
+
     /// What of a change of the group's displacement each column has.
     pub(super) fn amounts(&self, change: impl Fn(usize) -> [f32; 3]) -> [f32; Group::MOST_COLUMNS] {
         let mut sums = [0.0f64; Group::MOST_COLUMNS];
@@ -88,7 +113,8 @@ impl Lift {
                     .for_each(|(sum, change)| *sum += value * f64::from(change));
             }
         }
-        sums.map(|sum| (sum / count as f64) as f32)
+        // A cut body may have lost all of a group.
+        sums.map(|sum| (sum / count.max(1) as f64) as f32)
     }
 }
 

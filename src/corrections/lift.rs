@@ -31,7 +31,7 @@ const FLAT: f64 = 1e-3;
 
 impl Group {
     /// Made when it is first asked for.
-    fn lift(&self, context: SolverContext<'_>, rest: &[f32]) -> Result<&Lift> {
+    pub(super) fn lift(&self, context: SolverContext<'_>, rest: &[f32]) -> Result<&Lift> {
         if let Some(made) = self.lift.get() {
             return Ok(made);
         }
@@ -118,7 +118,11 @@ impl Lift {
                 columns.push(solver.answer(own, &input)?);
             }
         }
-        Ok(Lift { functions, columns })
+        Ok(Lift {
+            functions,
+            columns: Arc::new(columns),
+            parents: Vec::new(),
+        })
     }
 }
 
@@ -176,8 +180,8 @@ impl ImplicitSolver {
             }
             let lift = group.lift(context, input.rest)?;
             let amounts = lift.amounts(|at| change(group.nodes[at]));
-            for (amount, column) in amounts.into_iter().zip(&lift.columns) {
-                u.iter_mut().zip(column).for_each(|(u, w)| *u += amount * w);
+            for (amount, column) in amounts.into_iter().zip(&*lift.columns) {
+                lift.add((column, amount), u);
             }
         }
         held.put(u);
@@ -189,11 +193,13 @@ impl ImplicitSolver {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn let_go(context: SolverContext<'_>, rest: &[f32], held: &mut Held) -> Result<()> {
-        let mut fields: Vec<&[f32]> = Vec::new();
+        let mut fields: Vec<(&Lift, &[f32])> = Vec::new();
         let asked = SolverContext { held, ..context };
         for group in asked.let_go_groups() {
             let lift = group.lift(context, rest)?;
-            fields.extend(lift.columns.iter().map(Vec::as_slice));
+            let columns = lift.columns.iter();
+            memory::reserve(&mut fields, Group::MOST_COLUMNS, WHAT)?;
+            fields.extend(columns.map(|column| (lift, column.as_slice())));
         }
         if fields.is_empty() {
             held.modes = GroupModes::default();
@@ -215,7 +221,7 @@ impl ImplicitSolver {
     fn modes_of(
         &mut self,
         context: SolverContext<'_>,
-        fields: &[&[f32]],
+        fields: &[(&Lift, &[f32])],
         whole: Option<&WholeModes>,
     ) -> Result<WholeModes> {
         let env = context.env();
@@ -229,11 +235,10 @@ impl ImplicitSolver {
         let mut on_modes = memory::zeros(coarse, WHAT)?;
         self.nodes.clear();
         self.drift.fill(0.0);
-        for (at, field) in fields.iter().enumerate() {
+        for (at, (lift, field)) in fields.iter().enumerate() {
             for (node, own) in u.as_chunks_mut::<3>().0.iter_mut().enumerate() {
                 let part = if env.held.is[node] { 0.0 } else { TRIAL_MM };
-                let from = &field[3 * node..];
-                *own = [0, 1, 2].map(|axis| part * from[axis]);
+                *own = lift.row(field, node).map(|w| part * w);
             }
             let [stiff, heavy] = &mut products;
             self.residual(context, [&zero, &u, &u], stiff, &mut Report::default())?;

@@ -10,6 +10,7 @@
 mod body;
 mod boundary;
 mod cut;
+mod cut_groups;
 mod cut_loads;
 mod estimate;
 mod far;

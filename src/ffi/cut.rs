@@ -20,7 +20,7 @@ const MOST: u64 = 1 << 20;
 ///
 /// The scene has more nodes then (`out->node_count`): those that there were keep their numbers, and outputs have `3 * node_count` floats. The elements make each step from then on,
 /// with instruments, nodes, loads or without. Frames between steps, regions, attached points (each goes with the side on which it lies) and haptics go on. A step that
-/// starts from a displacement, and a support that moves, are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
+/// starts from a displacement is `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
 ///
 /// - `stroke`: calls with the same number are one blade that goes on; another number cuts anew.
 /// - `points`: `[pose_count, edge_count, 3]`, mm: the edge as a line of points, at each pose.

@@ -330,6 +330,7 @@ impl Model {
             "nodes": self.mesh.node_count(),
             "supports": NodeSet::listed(&self.mesh.supports),
             "regions": NodeSet::listed(&self.mesh.regions),
+            "gravity_at_rest_m_s2": self.manifest.gravity_at_rest_m_s2,
             "threads": self.threads,
             "stages": stages,
             "providers_refused": refused,

@@ -14,9 +14,9 @@ use super::StepInput;
 use super::build::build;
 use super::core::{Core, SCENE, lock_read, lock_write};
 use super::cut_state::CutState;
-use super::load_state::LoadState;
 use super::published::{BodyNumber, CutModel, Frame, Published};
 use crate::bundle::Mesh;
+use crate::contact::ties::tie_of;
 use crate::contact::{Force, Past};
 use crate::corrections::{History, Linearisation, Motion};
 use crate::error::{Error, Result};
@@ -72,12 +72,6 @@ impl Core {
 
     /// Whether a cut body can make such a step.
     pub(super) fn check_cut(&self, input: &StepInput<'_>) -> Result<()> {
-        if input.loads.support.is_some() || !input.loads.supports.is_empty() {
-            return self.check_intact("a step with a support that moves");
-        }
-        if !input.loads.ties.is_empty() {
-            return self.check_intact("a step with ties");
-        }
         match input.displacement {
             Some(_) => self.check_intact("a step from a displacement"),
             None => Ok(()),
@@ -93,19 +87,6 @@ impl Core {
         if self.corrected.is_none() {
             return Err(Error::Unsupported(
                 "cut: the elements move a cut body, and this scene makes no corrections; set `corrections`".into(),
-            ));
-        }
-        let ties = self.problem.as_ref().map(|problem| &problem.past.ties);
-        if ties.is_some_and(|ties| !ties.is_empty()) {
-            return Err(Error::Unsupported(
-                "cut: a body with ties cannot be cut; make a step without them first".into(),
-            ));
-        }
-        let moves = |loads: &LoadState| loads.carried() || loads.has_moved_groups();
-        if self.loads.as_ref().is_some_and(|loads| moves(loads)) {
-            return Err(Error::Unsupported(
-                "cut: a body whose support moves cannot be cut; make a step without one first"
-                    .into(),
             ));
         }
         let mut body = match &self.cut {
@@ -142,8 +123,8 @@ impl Core {
                 spread(&from.field, &mut to.field, source);
             }
         }
-        next.take_motion(self, source)?;
         next.follow_loads(self, source)?;
+        next.take_motion(self, source)?;
         next.take_pushes(&change.pushes)?;
         next.counters = self.counters;
         next.counters.sleeping = false;
@@ -337,6 +318,7 @@ impl Core {
         let mut past: Past = problem.past.copy()?;
         let held = past.tools.iter().flat_map(|held| held.grasp.anchors());
         let pushed = past.forces.iter().map(|force| force.sample);
+        let pushed = pushed.filter(|row| tie_of(*row).is_none());
         let count = held.clone().count() + past.forces.len();
         let all = held.map(|own| own.sample).chain(pushed);
         let mut rows = memory::collected(count, all, SCENE)?;
@@ -345,7 +327,11 @@ impl Core {
         let samples = [before.model.samples()?, self.model.samples()?];
         let found = ::contact::followed(&samples[0], &samples[1], &rows);
         let found = memory::tried(found, SCENE)?;
-        let renamed = |row: u32| rows.binary_search(&row).ok().and_then(|at| found[at]);
+        // A tie's row is its place in the list, whatever becomes of the surface.
+        let renamed = |row: u32| match tie_of(row) {
+            Some(_) => Some(row),
+            None => rows.binary_search(&row).ok().and_then(|at| found[at]),
+        };
         past.forces.retain_mut(|force| match renamed(force.sample) {
             Some(row) => {
                 force.sample = row;

@@ -163,8 +163,9 @@ impl LoadState {
         let acceleration = acceleration.map(|a| 1e3 * a);
         next.gravity = acceleration;
         let carriage = carriage.filter(Carriage::acts);
+        let carriage = carriage.map(|carriage| carriage.borne());
         if let Some(carriage) = &carriage {
-            let origin = carriage.borne(self.middle, [0.0; 3]);
+            let origin = carriage.at(self.middle, [0.0; 3]);
             (next.gravity.iter_mut().zip(origin)).for_each(|(g, own)| *g += own);
         }
         let rest = mesh.positions.as_chunks::<3>().0;
@@ -174,7 +175,7 @@ impl LoadState {
             let at = |field: &[f32], axis| field.get(3 * node + axis).copied().unwrap_or(0.0);
             let borne = carriage.map_or([0.0; 3], |carriage| {
                 let x = [0, 1, 2].map(|axis| rest[node][axis] + at(u, axis));
-                carriage.borne(x, [0, 1, 2].map(|axis| at(v, axis)))
+                carriage.at(x, [0, 1, 2].map(|axis| at(v, axis)))
             });
             let (from, part) = (parent(node), takes.get(node).copied().unwrap_or(1.0));
             for axis in 0..3 {
@@ -224,16 +225,6 @@ impl LoadState {
             }
         }
         Ok(())
-    }
-
-    /// Whether the last published state has a support that moves.
-    pub(super) fn carried(&self) -> bool {
-        self.last.carried.is_some()
-    }
-
-    /// Whether the last published state has a support group that is not as it was meshed.
-    pub(super) fn has_moved_groups(&self) -> bool {
-        supports::acts(&self.last.supports)
     }
 
     /// Support groups that are let go in the step that was made last, a bit each.

@@ -5,6 +5,7 @@ use std::sync::RwLock;
 use topology::Push;
 
 use super::core::{Core, lock_read};
+use super::cut_state::CutState;
 use super::load_state::LoadState;
 use super::loads::{Acting, Loads, WHAT};
 use super::published::Published;
@@ -24,6 +25,7 @@ impl Core {
         loads: &Loads<'_>,
     ) -> Result<bool> {
         loads.check(self.intact_mesh().node_count())?;
+        let loads = &loads.scanned_under(self.model.manifest.gravity_at_rest_m_s2);
         supports::check(loads.supports, &self.intact_mesh().supports)?;
         if self.loads.is_none() && !loads.acts() {
             return Ok(false);
@@ -50,6 +52,7 @@ impl Core {
         if turns {
             self.prepare_turning()?;
         }
+        self.prepare_groups()?;
         self.prepare_let_go()?;
         Ok(acts)
     }
@@ -116,11 +119,31 @@ impl Core {
 
     /// What a step in which gravity turns needs of a cut body: the intact one's answer to it.
     fn prepare_turning(&self) -> Result<()> {
-        let Some(cut) = &self.cut else {
+        let Some((cut, context)) = self.intact_context()? else {
             return Ok(());
         };
-        let (Some(prior), corrections) = (&cut.intact.prior, cut.intact.corrections()?) else {
+        (self.model.corrections()?).follow_gravity(context, cut.body.parents())
+    }
+
+    /// What a step with support groups needs of a cut body, likewise.
+    fn prepare_groups(&self) -> Result<()> {
+        if self.groups(true).is_empty() {
             return Ok(());
+        }
+        let Some((cut, context)) = self.intact_context()? else {
+            return Ok(());
+        };
+        let (rest, parents) = (&cut.intact.mesh.positions, cut.body.parents());
+        (self.model.corrections()?).follow_groups(context, rest, parents)
+    }
+
+    /// What solves on the intact body, where this one has been cut.
+    fn intact_context(&self) -> Result<Option<(&CutState, SolverContext<'_>)>> {
+        let Some(cut) = &self.cut else {
+            return Ok(None);
+        };
+        let (Some(prior), corrections) = (&cut.intact.prior, cut.intact.corrections()?) else {
+            return Ok(None);
         };
         let context = SolverContext {
             isa: self.machine.isa,
@@ -130,7 +153,7 @@ impl Core {
             time_step: &corrections.time_step,
             held: &corrections.body.held,
         };
-        (self.model.corrections()?).follow_gravity(context, cut.body.parents())
+        Ok(Some((cut, context)))
     }
 
     /// Takes what acts on the body before it was changed; `source` is the node that each of its nodes was.
@@ -145,7 +168,10 @@ impl Core {
         let mut state = self.blank_loads()?;
         let mass = [&before.model, &self.model].map(|model| model.corrections());
         let [then, now] = mass;
-        state.follow(&old.last, [&then?.body.mass, &now?.body.mass], source)?;
+        state.follow(&old.last, [&then?.body.mass, &now?.body.mass], &source)?;
+        let meshes = (&*before.mesh, &*self.mesh);
+        state.last.supports = supports::cut(&old.last.supports, meshes, source)?;
+        state.held = supports::restored(&self.mesh, &state.last.supports)?;
         self.loads = Some(state);
         Ok(())
     }

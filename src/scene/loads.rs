@@ -11,12 +11,11 @@ use super::supports::{self, GroupMotion, GroupState};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
+use crate::options::LARGEST_GRAVITY;
 use crate::stored;
 
 /// Pressures of a step at most.
 pub const MAX_PRESSURES: usize = 32;
-/// The largest gravity, in each direction, m/s².
-pub const LARGEST_GRAVITY: f32 = 1e3;
 /// The largest force on a node, in each direction, mN.
 pub const LARGEST_FORCE: f32 = 1e6;
 /// The largest pressure, Pa: ten times that of the air.
@@ -30,7 +29,8 @@ pub(super) const WHAT: &str = "the loads of a scene";
 pub struct Loads<'a> {
     /// Gravity in the mesh's frame, m/s²; with a support in the world's.
     pub gravity: [f32; 3],
-    /// Gravity under which the mesh was scanned, m/s²: what acts is the difference.
+    /// Gravity under which the mesh was scanned, m/s²: what acts is the difference. Zero: the bundle's, where `gravity` is not zero; without either
+    /// nothing acts.
     pub gravity_at_rest: [f32; 3],
     /// Forces on the nodes of the intact mesh `[K,3]`, mN. In a body that has been cut the tissue at a node's place takes its force.
     pub forces: Option<&'a [f32]>,
@@ -67,6 +67,17 @@ impl Loads<'_> {
         ties: &[],
         supports: &[],
     };
+
+    /// The same with the gravity under which a bundle's mesh was scanned, where these turn it and tell no other.
+    pub(super) fn scanned_under(self, gravity: [f32; 3]) -> Self {
+        match self.gravity != [0.0; 3] && self.gravity_at_rest == [0.0; 3] {
+            true => Loads {
+                gravity_at_rest: gravity,
+                ..self
+            },
+            false => self,
+        }
+    }
 
     /// Whether they are not all zero, or a support is given; ties are no loads here.
     pub(crate) fn acts(&self) -> bool {

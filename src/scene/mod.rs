@@ -62,7 +62,7 @@ use std::time::Duration;
 pub use bed::Bed;
 pub use cut_surface::{CutSurface, SurfaceUpdate};
 pub use cutting::{Blade, Cut};
-pub use loads::{LARGEST_FORCE, LARGEST_GRAVITY, LARGEST_PRESSURE, Loads, MAX_PRESSURES, Pressure};
+pub use loads::{LARGEST_FORCE, LARGEST_PRESSURE, Loads, MAX_PRESSURES, Pressure};
 pub use points::check_point_count;
 pub use publish::{QUIET_DISPLACEMENT, QUIET_STEPS};
 pub use published::View;

@@ -79,11 +79,6 @@ impl Scene {
         let cut = lock_read(&self.shared.published).cut.clone();
         let model = cut.as_ref().map_or(&self.model, |cut| &cut.0);
         let mesh = cut.as_ref().map_or(&self.mesh, |cut| &cut.0.mesh);
-        if cut.is_some() && !input.loads.supports.is_empty() {
-            return Err(Error::Unsupported(
-                "supports: the body was cut, and a support moves an intact one; pass none".into(),
-            ));
-        }
         let tissue = self.tissue(model, mesh);
         presenters.prepare(&tissue, view, || {
             let begun = lock_read(&self.shared.published).frame_state.is_some();

@@ -139,6 +139,30 @@ impl Carried {
     }
 }
 
+/// What the body bears of a support that moves: its columns by the coordinates of the frame, per mass, 1/s² and 1/s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Borne {
+    /// mm/s².
+    at_origin: [f32; 3],
+    of_place: [[f32; 3]; 3],
+    of_velocity: [[f32; 3]; 3],
+}
+
+impl Borne {
+    /// At `x` of the frame (mm) where the body moves at `v` (mm/s), per mass, mm/s².
+    #[inline]
+    pub(super) fn at(&self, x: [f32; 3], v: [f32; 3]) -> [f32; 3] {
+        let mut sum = self.at_origin;
+        for k in 0..3 {
+            let (place, velocity) = (&self.of_place[k], &self.of_velocity[k]);
+            for axis in 0..3 {
+                sum[axis] += place[axis] * x[k] + velocity[axis] * v[k];
+            }
+        }
+        sum
+    }
+}
+
 impl Carriage {
     /// `R^T v`.
     fn back(&self, v: [f64; 3]) -> [f64; 3] {
@@ -150,15 +174,17 @@ impl Carriage {
         self.back(v.map(f64::from)).map(|v| v as f32)
     }
 
-    /// What the body bears at `x` of the frame (mm) where it moves at `v` (mm/s), per mass, mm/s².
-    pub(super) fn borne(&self, x: [f32; 3], v: [f32; 3]) -> [f32; 3] {
-        let (x, v) = (x.map(f64::from), v.map(f64::from));
-        let felt = [0, 1, 2].map(|row| {
-            let (a, b) = (&self.acceleration[row], &self.velocity[row]);
-            let carried: f64 = (0..3).map(|k| a[k] * x[k] + 2.0 * b[k] * v[k]).sum();
-            carried + a[3]
-        });
-        self.back(felt).map(|a| -a as f32)
+    /// What the body bears, as a function of place and velocity.
+    pub(super) fn borne(&self) -> Borne {
+        let column = |of: &Affine, k: usize, factor: f64| {
+            let own = [0, 1, 2].map(|row| of[row][k]);
+            self.back(own).map(|a| (-factor * a) as f32)
+        };
+        Borne {
+            at_origin: column(&self.acceleration, 3, 1.0),
+            of_place: [0, 1, 2].map(|k| column(&self.acceleration, k, 1.0)),
+            of_velocity: [0, 1, 2].map(|k| column(&self.velocity, k, 2.0)),
+        }
     }
 
     /// Whether the body bears anything of it.
@@ -191,12 +217,12 @@ mod tests {
             (last, carriage) = (next, Some(own));
         }
         let carriage = carriage.unwrap();
-        let [x, y, z] = carriage.borne([50.0, 0.0, 7.0], [0.0; 3]);
+        let [x, y, z] = carriage.borne().at([50.0, 0.0, 7.0], [0.0; 3]);
         assert!(
             (x - 200.0).abs() < 1.0 && y.abs() < 1.0 && z == 0.0,
             "{x} {y} {z}"
         );
-        let [x, y, _] = carriage.borne([0.0; 3], [30.0, 0.0, 0.0]);
+        let [x, y, _] = carriage.borne().at([0.0; 3], [30.0, 0.0, 0.0]);
         assert!(x.abs() < 0.5 && (y + 120.0).abs() < 0.5, "{x} {y}");
         let gravity = carriage.in_frame([0.0, 0.0, -9.81]);
         assert!((gravity[2] + 9.81).abs() < 1e-5);

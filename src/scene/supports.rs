@@ -181,7 +181,7 @@ impl GroupState {
             let held = grip.map_or(x, |grip| [0, 1, 2].map(|k| x[k] + f64::from(grip[k])));
             let there = pose.map_or(held, |pose| carried(&pose, held));
             let place = match motion.displacements {
-                Some(given) => [0, 1, 2].map(|k| given[3 * index + k]),
+                Some(given) => [0, 1, 2].map(|k| given[3 * group.row(index) + k]),
                 None => [0, 1, 2].map(|k| (there[k] - x[k]) as f32),
             };
             let way = [0, 1, 2].map(|k| place[k] - now[node as usize][k]);
@@ -259,6 +259,35 @@ pub(super) fn copy(from: &[GroupState], to: &mut Vec<GroupState>) -> Result<()> 
         memory::replace(&mut to.grip, &from.grip, WHAT)?;
     }
     Ok(())
+}
+
+/// The groups of a body that is cut further, from `then` to `now`; `source` is the node that each of its nodes was.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub(super) fn cut(
+    states: &[GroupState],
+    (then, now): (&Mesh, &Mesh),
+    source: impl Fn(usize) -> usize,
+) -> Result<Vec<GroupState>> {
+    let mut made = memory::room(states.len(), WHAT)?;
+    for (at, state) in states.iter().enumerate() {
+        let (before, after) = (&then.supports[at].nodes, &now.supports[at].nodes);
+        let mut grip = Vec::new();
+        if let (false, rows) = (state.grip.is_empty(), state.grip.as_chunks::<3>().0) {
+            grip = memory::room(3 * after.len(), WHAT)?;
+            grip.extend(after.iter().flat_map(|node| {
+                let row = before.binary_search(&(source(*node as usize) as u32));
+                row.map_or([0.0; 3], |row| rows[row])
+            }));
+        }
+        made.push(GroupState {
+            let_go: state.let_go,
+            grip,
+            moves: state.moves,
+        });
+    }
+    Ok(made)
 }
 
 /// Whether any group is not as it was meshed.

@@ -2,7 +2,7 @@
 //!
 //! REQ-072: A tie pulls as its spring does, and once broken stays so.
 
-use ::contact::{End, Tie, Vector};
+use ::contact::{End, Sample, Tie, Vector};
 
 use super::StepInput;
 use super::core::Core;
@@ -12,7 +12,24 @@ use crate::memory;
 
 const WHAT: &str = "the ties of a scene";
 
+/// The points of the tissue that a tie has.
+fn points_of(tie: &Tie) -> impl Iterator<Item = Sample> {
+    let far = match tie.end {
+        End::Tissue(far) => Some(far),
+        _ => None,
+    };
+    [Some(tie.point), far].into_iter().flatten()
+}
+
 impl Core {
+    /// Whether cuts and resections have left nothing around a node of the intact mesh.
+    fn is_gone(&self, node: u32) -> bool {
+        let Some(corrected) = self.cut.as_ref().and(self.model.corrections().ok()) else {
+            return false;
+        };
+        corrected.body.mass.get(node as usize) == Some(&0.0)
+    }
+
     /// # Errors
     /// [`Error::Unsupported`] for ties in a scene that makes no corrections.
     pub(super) fn check_ties(&self, ties: &[Tie]) -> Result<()> {
@@ -32,11 +49,34 @@ impl Core {
     pub(super) fn place_ties(&mut self, input: &StepInput<'_>, tools: usize) -> Result<()> {
         let given = input.loads.ties;
         let (prior, held) = (&self.model.prior, &self.held);
+        // A place in the list that holds nothing may name tissue that is gone.
+        let is_idle = |node: u32| {
+            let has = |point: &Sample| point.entries().any(|(own, _)| own == node);
+            let mut of_it = given
+                .iter()
+                .filter(|tie| points_of(tie).any(|point| has(&point)));
+            self.is_gone(node) && of_it.all(|tie| tie.spring.stiffness == 0.0)
+        };
         let moves = |node: u32| {
             let prior = prior.as_ref();
-            prior.is_some_and(|prior| prior.column_for(held, node).is_some())
+            let column = prior.and_then(|prior| prior.column_for(held, node));
+            column.is_some() || is_idle(node)
         };
-        ties::check(given, tools, self.mesh.node_count(), moves)?;
+        let count = self.intact_mesh().node_count();
+        for (index, tie) in given.iter().enumerate() {
+            let is_gone = |point: &Sample| {
+                let mut nodes = point.entries().map(|(node, _)| node);
+                nodes.all(|node| (node as usize) < count && self.is_gone(node))
+            };
+            let mut points = points_of(tie);
+            if let (true, Some(point)) = (tie.spring.stiffness > 0.0, points.find(is_gone)) {
+                return Err(Error::Argument(format!(
+                    "ties[{index}]: of its nodes {:?} the body has nothing left; give it a stiffness of 0",
+                    point.nodes
+                )));
+            }
+        }
+        ties::check(given, tools, count, moves)?;
         let support = input.loads.support.map(|pose| pose.checked()).transpose()?;
         self.placed_ties.clear();
         memory::fit(&mut self.placed_ties, given.len(), WHAT)?;

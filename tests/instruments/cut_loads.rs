@@ -188,20 +188,6 @@ fn loads_go_on_across_cuts_and_undo() {
         ..StepInput::default()
     };
     assert!(matches!(scene.step(bad, None), Err(Error::Argument(_))));
-    let moved = StepInput {
-        loads: Loads {
-            support: Some(upt::SupportPose {
-                position: [0.0; 3],
-                rotation: [0.0, 0.0, 0.0, 1.0],
-            }),
-            ..Loads::default()
-        },
-        ..StepInput::default()
-    };
-    assert!(matches!(
-        scene.step(moved, None),
-        Err(Error::Unsupported(_))
-    ));
     assert_eq!(scene.save().unwrap(), saved);
 }
 

@@ -3,6 +3,7 @@
 
 mod cut_blade;
 mod cut_grasp;
+mod cut_held;
 mod cut_loads;
 mod cut_operations;
 mod cut_scenes;

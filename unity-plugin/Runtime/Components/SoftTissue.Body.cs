@@ -185,11 +185,6 @@ namespace Upt
             for (int i = 0; i < supports.Count; i++)
                 if (supports[i] != null && supports[i].isActiveAndEnabled) count++;
             if (count == 0) return null;
-            if (undone.Count > 0)
-            {
-                Warn("the support groups of a body that has been cut stay where they were meshed");
-                return null;
-            }
             if (groups.Length != count) groups = new SupportGroup[count];
             count = 0;
             for (int i = 0; i < supports.Count; i++)

@@ -46,7 +46,7 @@ namespace Upt
         /// <summary>The group at a part of the way from the last frame to this one, 1: now.</summary>
         internal unsafe SupportGroup At(float part, float unitsPerMillimetre)
         {
-            // Where it was meshed, to the last bit: a body that no group moves can be cut.
+            // Where it was meshed, to the last bit: a group that does not move costs nothing.
             if (AtStart(placeBefore, turnBefore) && AtStart(place, turn)) return new SupportGroup { Group = group, LetGo = letGo };
             Quaternion now = Between(turnBefore, turn, part) * Quaternion.Inverse(startTurn);
             // A node x ends at now (x - start) + place.

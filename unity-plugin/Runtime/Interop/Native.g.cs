@@ -363,7 +363,7 @@ namespace Upt.Interop
         public ulong support_count;
         /// <summary>Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.</summary>
         public fixed float gravity[3];
-        /// <summary>Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node.</summary>
+        /// <summary>Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node. Zeros: the bundle's, where `gravity` is not zero.</summary>
         public fixed float gravity_at_rest[3];
         /// <summary>
         /// Where what holds the body is at the end of the step, mm: a point `x` of the mesh's frame is at `R x + support_position` in the world. All else stays in
@@ -1305,7 +1305,7 @@ namespace Upt.Interop
         ///
         /// The scene has more nodes then (`out-&gt;node_count`): those that there were keep their numbers, and outputs have `3 * node_count` floats. The elements make each step from then on,
         /// with instruments, nodes, loads or without. Frames between steps, regions, attached points (each goes with the side on which it lies) and haptics go on. A step that
-        /// starts from a displacement, and a support that moves, are `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
+        /// starts from a displacement is `UPT_ERR_UNSUPPORTED` until `upt_scene_reset`, or until a snapshot from before is restored, which is undo.
         ///
         /// - `stroke`: calls with the same number are one blade that goes on; another number cuts anew.
         /// - `points`: `[pose_count, edge_count, 3]`, mm: the edge as a line of points, at each pose.

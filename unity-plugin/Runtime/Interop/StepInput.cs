@@ -48,7 +48,8 @@ namespace Upt.Interop
         /// corrections.</summary>
         public (float X, float Y, float Z) Gravity;
 
-        /// <summary>Gravity under which the mesh was scanned, m/s²: the difference acts.</summary>
+        /// <summary>Gravity under which the mesh was scanned, m/s²: the difference acts. Zeros: the
+        /// bundle's.</summary>
         public (float X, float Y, float Z) GravityAtRest;
 
         /// <summary>The first <paramref name="count"/> instruments drive the step.</summary>
