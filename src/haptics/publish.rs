@@ -2,6 +2,7 @@
 
 mod motion;
 mod stepped;
+mod tied;
 pub mod tissue;
 
 use std::sync::Arc;
@@ -13,6 +14,7 @@ use exchange::{Reader, Writer, exchange};
 pub use self::stepped::Stepped;
 
 use self::motion::{Carried, ModalRoom};
+use self::tied::OwnTies;
 use super::HapticOptions;
 use super::ends::Ends;
 use super::modes::Modes;
@@ -70,6 +72,7 @@ pub struct Link {
     masses: Vec<f32>,
     rows: Vec<u32>,
     carried: Carried,
+    ties: OwnTies,
     /// How many states were published: the hand sees by it how many it missed.
     number: u64,
     /// Age of a state when the hand gets it, s; the time that the step took where the host gave none.
@@ -121,6 +124,7 @@ pub fn join(
         masses: memory::collected(natural.len(), natural.iter().map(|mode| mode.1), WHAT)?,
         rows: memory::collected(natural.len(), 0..natural.len() as u32, WHAT)?,
         carried: Carried::default(),
+        ties: OwnTies::default(),
         number: 0,
         latency_s: options.latency_s,
         last_pose: None,
@@ -196,13 +200,15 @@ impl Link {
             Some((&step.corrections.space, &self.inertial_compliance)),
         );
         let samples = &*self.samples;
-        let of = self.found.iter().map(|(_, row)| samples.at(*row));
+        let ties = &self.ties;
+        let of = self.found.iter().map(|(_, row)| ties.sample(samples, *row));
         let masses = of
             .clone()
             .map(|sample| mass(sample, &step.corrections.body.mass, held));
         self.sampled.clear();
         self.sampled.extend(self.found.iter().map(|(_, row)| *row));
-        let w = self.delassus.of(compliance, samples, &self.sampled)?;
+        let all = ties.points(samples);
+        let w = self.delassus.of(compliance, all, &self.sampled)?;
         let snapshot = self.out.buffer();
         snapshot.delassus[..w.len()].copy_from_slice(w);
         snapshot.delay_s = delay(w, masses);
@@ -244,7 +250,8 @@ impl Link {
         snapshot.pose = past.map(|(_, tool)| tool.pose);
         snapshot.count = self.found.len();
         for (at, &(_, row)) in self.found.iter().enumerate() {
-            let sample = self.samples.at(row);
+            let tie = self.ties.of(row);
+            let sample = self.ties.sample(&self.samples, row);
             let point = sample.gather(|node| state.position(node));
             let anchor = past.and_then(|(_, tool)| tool.grasp.place(row));
             let force = past.map_or(Vector::ZERO, |(past, _)| {
@@ -252,17 +259,24 @@ impl Link {
                 let found = past
                     .forces
                     .binary_search_by_key(&(self.instrument, row), key);
-                found.map_or(Vector::ZERO, |place| past.forces[place].force)
+                found.map_or_else(|_| tied::force(past, row), |at| past.forces[at].force)
             });
             snapshot.points[at] = point;
             let groups = step.corrections.groups.as_slice();
             let base = |node| Vector::from(self.carried.velocity(groups, node));
             snapshot.carried[at] = sample.gather(base);
-            snapshot.outward[at] = outward(&self.samples, row, state);
+            snapshot.outward[at] = match tie {
+                Some(_) => Vector::X,
+                None => outward(&self.samples, row, state),
+            };
+            snapshot.ties[at] = tie;
             snapshot.forces[at] = force;
             snapshot.anchors[at] = anchor;
             // What the step's solve left, which the hand must not feel as a motion.
             snapshot.errors[at] = snapshot.pose.map_or(Vector::ZERO, |pose| {
+                if let Some(tie) = &tie {
+                    return tied::error(tie, &pose, point, force);
+                }
                 let pair = Pair {
                     body: &self.body,
                     friction: self.friction,
@@ -294,6 +308,10 @@ impl Link {
     fn find(&mut self, step: &Stepped<'_>) -> Result<()> {
         let pose = *self.pose.read();
         self.found.clear();
+        self.ties.find(step.problem, self.instrument)?;
+        memory::fit(&mut self.found, self.ties.rows().count(), WHAT)?;
+        self.found
+            .extend(self.ties.rows().map(|row| (f32::MIN, row)));
         let index = self.instrument as usize;
         if let Some(problem) = step.problem {
             let past = &problem.past;

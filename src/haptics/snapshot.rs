@@ -3,6 +3,7 @@
 
 use ::contact::{Pose, Vector};
 
+use crate::contact::ties::Placed;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
@@ -32,7 +33,9 @@ pub struct ContactSnapshot {
     pub forces: Vec<Vector>,
     /// Of a held one, its place on the tool.
     pub anchors: Vec<Option<Vector>>,
-    /// The step's own error: gap (x) of a touching sample, way from the anchor of a held one, mm.
+    /// Of a tie that ends on the tool, what it is.
+    pub ties: Vec<Option<Placed>>,
+    /// The step's own error: gap (x) of a touching sample, way from the anchor of a held one, a tie's length beyond what its spring explains, mm.
     pub errors: Vec<Vector>,
     /// How samples move at once under forces on samples `[3n,3n]`, mm/mN: the compliance without the natural modes.
     pub delassus: Vec<f32>,
@@ -67,6 +70,7 @@ impl ContactSnapshot {
             outward: vectors()?,
             forces: vectors()?,
             anchors: memory::filled(MOST_SAMPLES, None, WHAT)?,
+            ties: memory::filled(MOST_SAMPLES, None, WHAT)?,
             errors: vectors()?,
             delassus: memory::zeros(rows * rows, WHAT)?,
             delay_s: 0.0,

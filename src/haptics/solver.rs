@@ -1,11 +1,12 @@
 //! The samples between two steps: where they are, and the forces of a tool at a pose on them.
 
-use ::contact::{Body, Contact, Law, Limits, Pose, Sweeps, Vector, Whole};
+use ::contact::{Body, Contact, Law, Limits, Pose, Spring, Sweeps, Vector, Whole};
 
 use super::modes::Modes;
 use super::snapshot::{ContactSnapshot, MOST_SAMPLES};
 use super::stiffness::{Direction, Stiffness};
 use crate::contact::Pair;
+use crate::contact::ties::Placed;
 use crate::error::Result;
 use crate::memory;
 
@@ -153,8 +154,9 @@ impl Solver {
             let pushed = self.forces[at] != Vector::ZERO;
             let point = self.place(snapshot, at);
             let outside = point.cmplt(low).any() || point.cmpgt(high).any();
-            let held = snapshot.anchors[at].is_some();
-            let distance = match outside && !pushed && !held {
+            let tied = snapshot.ties[at].is_some();
+            let held = snapshot.anchors[at].is_some() || tied;
+            let distance = match tied || outside && !pushed && !held {
                 true => f32::MAX,
                 false => body.nearest_at(now, point).distance,
             };
@@ -194,7 +196,10 @@ impl Solver {
                 way_out: None,
             };
             let (point, start) = (self.place(snapshot, at), self.points[at]);
-            let mut contact = pair.contact(point, start, snapshot.outward[at], force);
+            let mut contact = match &snapshot.ties[at] {
+                Some(tie) => pulling(tie, now, point),
+                None => pair.contact(point, start, snapshot.outward[at], force),
+            };
             match contact.law {
                 Law::Bound | Law::Tie(_) => contact.slip -= error,
                 Law::Touch { .. } if contact.gap < f32::MAX => contact.gap -= error.x,
@@ -223,7 +228,11 @@ impl Solver {
             self.change(snapshot, at, change, part);
         }
         for at in 0..snapshot.count {
-            self.points[at] = self.place(snapshot, at);
+            // A tie pulls the tool at its own end.
+            self.points[at] = match &snapshot.ties[at] {
+                Some(tie) => now.transform_point(tie.place),
+                None => self.place(snapshot, at),
+            };
         }
         let m = snapshot.modes;
         self.modes.push.fill(0.0);
@@ -275,6 +284,20 @@ impl Solver {
         }
         let all = 3 * snapshot.count;
         self.stiffness.of(|i, j| snapshot.delassus[i * all + j])
+    }
+}
+
+/// A tie whose far end is on the tool, without its damper.
+fn pulling(tie: &Placed, now: &Pose, point: Vector) -> Contact {
+    let spring = Spring {
+        damping: 0.0,
+        ..tie.tie.spring
+    };
+    Contact {
+        law: Law::Tie(spring.over(0.0, 1.0)),
+        normal: Vector::X,
+        gap: 0.0,
+        slip: point - now.transform_point(tie.place),
     }
 }
 

@@ -1,8 +1,9 @@
-//! Hands in tissue under loads: gravity, and what relaxing tissue remembers.
+//! Hands in tissue under loads: gravity, ties, and what relaxing tissue remembers.
 
 use super::fixture::relaxing;
 use super::*;
-use upt::{Loads, StepInput};
+use contact::Vector;
+use upt::{Loads, Spring, StepInput, Tie, TieEnd, TiePoint};
 
 /// Under a hand that holds still the force falls as the steps say, and runs on between them.
 #[test]
@@ -67,4 +68,94 @@ fn a_hand_that_stays_feels_no_more_of_gravity_than_the_step_told() {
             }
         }
     }
+}
+
+/// A tool that is tied to the tissue feels the tie at its own pose: what the step told where it stays, and more at once where it draws away.
+#[test]
+fn a_hand_feels_the_ties_of_its_tool() {
+    let scene = scene(&model("tiny-corrected"), &corrected());
+    let mut hand = hand(&scene);
+    let place = top(&scene);
+    let node = scene
+        .mesh()
+        .domain_nodes
+        .iter()
+        .copied()
+        .find(|node| scene.mesh().positions[3 * *node as usize..][..3] == place)
+        .unwrap();
+    let tie = Tie {
+        point: TiePoint {
+            nodes: [node; 3],
+            weights: [1.0, 0.0, 0.0],
+        },
+        end: TieEnd::Tool {
+            tool: 0,
+            place: Vector::ZERO,
+        },
+        spring: Spring {
+            stiffness: 15.0,
+            slack_mm: 4.0,
+            ..Spring::default()
+        },
+        break_mn: 0.0,
+    };
+    let mut told = Vec::new();
+    // 6 mm above the tissue it is drawn up by another 2 mm, at the end within one step.
+    let depth = |t: u32, k: u32| match (t, k) {
+        (0..40, _) => -6.0,
+        (40, _) => -6.0 - 0.02 * f64::from(k),
+        _ => -7.0,
+    };
+    let (mut felt_there, mut within) = (Vec::new(), Vec::new());
+    for t in 0..60u32 {
+        let tools = [ball(&scene, depth(t, 0))];
+        let ties = [tie];
+        let input = StepInput {
+            contact: Contact::Tools(&tools),
+            loads: Loads {
+                ties: &ties,
+                ..Loads::default()
+            },
+            ..StepInput::default()
+        };
+        scene.step(input, None).unwrap();
+        told.push(felt(&scene)[2]);
+        for k in 0..50 {
+            let time = DT * f64::from(t) + 1e-3 * f64::from(k);
+            let force = hand.render(&pose(&scene, depth(t, k), time)).unwrap();
+            let force = 1e3 * force.force_n[2];
+            if t == 40 {
+                within.push(force);
+            }
+            felt_there.push(force);
+        }
+    }
+    assert!(told[39] < -20.0, "{} mN", told[39]);
+    let rests = felt_there[50 * 39 + 49];
+    assert!(
+        (rests / told[39] - 1.0).abs() < 0.02,
+        "{rests} {} mN",
+        told[39]
+    );
+    // Drawn up by 0.98 mm it pulls harder in each millisecond, about as hard as the steps say that come to rest there.
+    assert!(
+        within
+            .windows(2)
+            .skip(2)
+            .all(|pair| pair[1] <= pair[0] + 1e-3)
+    );
+    let (end, rest) = (within[49], told[59]);
+    println!("{rests} mN, drawn up {end}, the steps {rest}");
+    assert!(
+        end < rests - 3.0 && (end / rest - 1.0).abs() < 0.1,
+        "{end} {rest}"
+    );
+    // Cut, it pulls no more.
+    step(&scene, &[ball(&scene, -7.0)]);
+    for k in 0..100 {
+        let time = DT * 60.0 + 1e-3 * f64::from(k);
+        hand.render(&pose(&scene, -7.0, time)).unwrap();
+    }
+    let force = hand.render(&pose(&scene, -7.0, DT * 63.0)).unwrap().force_n;
+    assert!(size(&force) < 1e-3, "{force:?}");
 }
