@@ -60,7 +60,7 @@ class Loads:
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """In the mesh's frame, m/s²."""
     gravity_at_rest: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """That under which the mesh was scanned, m/s²."""
+    """That under which the mesh was scanned, m/s²; zeros: the bundle's."""
     forces: ArrayLike | None = None
     """`[K, 3]`, mN, on the nodes."""
     pressures: Sequence[tuple[ArrayLike | None, float]] = ()

@@ -90,6 +90,12 @@ fn manifest_errors_name_the_field() {
         ),
         (
             "tiny-upt",
+            "/gravity_at_rest_m_s2",
+            serde_json::json!([0, -9810, 0]),
+            "gravity_at_rest_m_s2",
+        ),
+        (
+            "tiny-upt",
             "/precisions",
             serde_json::json!([]),
             "precisions",

@@ -94,6 +94,7 @@ def requirements(manifest: dict) -> list[str]:
     parts = {
         "anchors": "anchors" in manifest.get("upt", {}),
         "corrections": "corrections" in manifest,
+        "gravity_at_rest": "gravity_at_rest_m_s2" in manifest,
         "law": "law" in manifest.get("material", {}),
         "relaxation": "relaxation" in manifest.get("material", {}),
         "release": "release" in manifest.get("prior", {}),

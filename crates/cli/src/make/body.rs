@@ -12,6 +12,7 @@ use tissue::mesh_quality::{Quality, measure};
 use super::fixed;
 use super::options::Options;
 use super::stages::Stage;
+use super::unload::unload;
 use crate::{foreign, preview};
 
 /// A body's longest side, mm: outside of this the unit is taken to be wrong.
@@ -85,6 +86,7 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
         mesh.name.clone_from(name);
     }
     mesh.license.clone_from(&options.license);
+    unload(&mut mesh, options, stage)?;
     let path = stage.folder.join("mesh.safetensors");
     mesh.write(&path)
         .with_context(|| format!("{}: cannot be written", path.display()))?;

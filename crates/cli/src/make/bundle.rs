@@ -8,7 +8,9 @@ use sha2::{Digest, Sha256};
 use tissue::mesh::Mesh;
 
 use super::fixed;
-use super::options::{Options, Sizes};
+use super::options::Options;
+use super::sizes::Sizes;
+use super::unload;
 
 /// What a bundle of this command says of its origin.
 const COMMAND: &str = "upt make";
@@ -81,6 +83,10 @@ pub fn assemble(
     if !material.relaxation.is_empty() {
         requires.insert(0, "relaxation");
     }
+    let gravity = unload::at_rest(options);
+    if gravity.is_some() {
+        requires.insert(0, "gravity_at_rest");
+    }
     let rounded = |x: f64| (x * 1000.0).round() / 1000.0;
     let blank = "0".repeat(64);
     let entries = [
@@ -121,6 +127,7 @@ pub fn assemble(
         ),
         ("supports", json!(fixed::read(work, fixed::SUPPORTS)?)),
         ("regions", json!(fixed::read(work, fixed::REGIONS)?)),
+        ("gravity_at_rest_m_s2", json!(gravity.unwrap_or_default())),
         (
             "provenance",
             json!({"command": COMMAND, "version": env!("CARGO_PKG_VERSION"), "options": options.words(), "seed": options.seed}),
@@ -129,9 +136,11 @@ pub fn assemble(
         ("files", Value::Object(files)),
         (DIGEST, json!(blank)),
     ];
-    // A bundle without groups and regions is one that libraries before them read.
-    let is_told = |(name, value): &&(&str, Value)| {
-        !matches!(*name, "supports" | "regions") || *value != json!([])
+    // A bundle without these is one that libraries before them read.
+    let is_told = |(name, value): &&(&str, Value)| match *name {
+        "supports" | "regions" => *value != json!([]),
+        "gravity_at_rest_m_s2" => gravity.is_some(),
+        _ => true,
     };
     let lines: Vec<String> = entries
         .iter()

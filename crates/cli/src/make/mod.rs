@@ -15,13 +15,16 @@ mod certify;
 mod clock;
 mod emit;
 mod fixed;
+mod gravity;
 mod learn;
 mod options;
 mod patches;
 mod projected;
 mod refine;
+mod sizes;
 mod stages;
 mod tables;
+mod unload;
 mod vibration;
 
 pub use options::Options;
@@ -37,7 +40,7 @@ use tissue::mesh::Mesh;
 use crate::corrections::{Known, Workbench, principal};
 use crate::{corrections, modes, preview, prior};
 use clock::Clock;
-use options::Sizes;
+use sizes::Sizes;
 use stages::{Work, key_of};
 
 /// Length of step for hosts that show frames, where one takes less than half of it here, s.

@@ -1,29 +1,22 @@
-//! Options of `upt make`, and what follows from them: material, sizes of tools, keys of stages.
+//! Options of `upt make`, and what follows from them: material, keys of stages.
 
 use std::path::PathBuf;
 
 use super::fixed::Fixed;
+use super::gravity::{Gravity, gravity};
 use anyhow::{Result, bail};
 use clap::Args;
 use elements::{Law, Material, Relaxation};
 use serde_json::{Value, json};
-use tissue::mesh::{Boundary, Mesh, face_area};
+use tissue::mesh::Boundary;
 use tissue::mesh_import::Region;
-use tissue::programmes::{BodySize, ToolProgramme, ToolScale};
+use tissue::programmes::ToolProgramme;
 
 use crate::effort::Effort;
 use crate::loads;
 use crate::materials;
-use crate::tool_scale::{self, PUSH_MM};
+use crate::tool_scale;
 
-/// Areas that the checks' programmes have at scale 1, mm² (`tissue::schemes`).
-const AREA_MM2: [f64; 2] = [60.0, 280.0];
-/// Corrections that are recommended for pushes of [`PUSH_MM`], as the bundles that ship.
-const CORRECTIONS: Effort = Effort {
-    most: 10,
-    target_mm: 0.02,
-    substeps: 2,
-};
 /// Until the estimated error is calibrated a bundle recommends so many, and coarse spaces are compared with so many.
 const DRAFT: u32 = 5;
 
@@ -32,6 +25,7 @@ const DRAFT: u32 = 5;
   upt make liver.obj --out liver --unit cm --fixed plane:0,0,-1,-20
   upt make kidney.stl --out kidney --fixed ball:0,0,12,9 --domain ball:30,0,0,25 --minutes 3
   upt make heart.vtu --out heart --fixed inside:pericardium.stl --young 15000 --nodes 8000
+  upt make liver.obj --out liver --support bed=plane:0,0,-1,-20 --support ligament=ball:40,0,20,8 --gravity 0,-9.81,0 --unload
   upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --preview
   upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --emit slurm jobs")]
 pub struct Options {
@@ -56,12 +50,23 @@ pub struct Options {
     /// Region whose nodes are held: ball:x,y,z,r, plane:a,b,c,d (where a x + b y + c z + d > 0), inside:FILE (a closed surface in the input's
     /// unit), group:NAME (a group, material or #rrggbb colour of the input), or not: before one of these. May be repeated. Default: what the
     /// mesh file holds. With NAME= before it the nodes are a support group, which a host moves and lets go apart; of several, a node is the first one's.
-    #[arg(long, value_name = "[NAME=]REGION", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        visible_alias = "support",
+        value_name = "[NAME=]REGION",
+        allow_hyphen_values = true
+    )]
     pub fixed: Vec<Fixed>,
     /// Part of the surface that the bundle names, on which a host gives a pressure: boundary triangles with all three corners in a region, as of --fixed. May
     /// be repeated; regions of one name are one, and they may overlap.
     #[arg(long, value_name = "NAME=REGION", allow_hyphen_values = true)]
     pub pressure: Vec<Fixed>,
+    /// Gravity under which the body was scanned, m/s²: what acts on it is what a host's differs by. Of an organ in fluid, what the fluid does not carry of it.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = gravity)]
+    pub gravity: Option<Gravity>,
+    /// Make the bundle of the body's shape without the gravity of --gravity, of which the input is the equilibrium: a host's gravity then acts in full.
+    #[arg(long, requires = "gravity")]
+    pub unload: bool,
     /// Node sets of a mesh file that are held: `fixed`, or `supported` (both sets; not together with --fixed).
     #[arg(long, default_value = "fixed")]
     pub boundary: Boundary,
@@ -270,6 +275,9 @@ impl Options {
         let more = (&self.label, self.refill, self.boundary.as_str());
         let sets = (&self.stiffness, &self.fixed, &self.pressure);
         let mut words = format!("{} {mesh:?} {more:?} {sets:?}", self.scale()?);
+        if let (Some(Gravity(own)), true) = (self.gravity, self.unload) {
+            words += &format!(" free of {own:?} {:?}", self.material()?);
+        }
         let named = self.fixed.iter().chain(&self.pressure);
         let held = named.map(|named| &named.region);
         let regions = held.chain([&Region::All]).chain(&self.domain);
@@ -293,7 +301,7 @@ impl Options {
         json!({
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
             "boundary": self.boundary.as_str(), "fixed": self.fixed.iter().map(Fixed::to_string).collect::<Vec<String>>(),
-            "pressure": self.pressure.iter().map(Fixed::to_string).collect::<Vec<String>>(), "domain": list(&self.domain), "nodes": self.nodes,
+            "pressure": self.pressure.iter().map(Fixed::to_string).collect::<Vec<String>>(), "domain": list(&self.domain), "nodes": self.nodes, "gravity": self.gravity.map(|own| own.0), "unload": self.unload,
             "part": self.part, "label": self.label, "refill": self.refill,
             "material": self.material, "relaxation": self.relaxation.to_string(), "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,
@@ -308,90 +316,5 @@ impl Options {
             self.corrections
                 .map_or(DRAFT, |effort| effort.most.min(DRAFT)),
         )
-    }
-}
-
-/// How large tools and pushes are for this body.
-#[derive(Clone, Copy, Debug)]
-pub struct Sizes {
-    /// Deepest push, mm.
-    pub push_mm: f64,
-    /// Area of a contact, mm².
-    pub area_mm2: [f64; 2],
-    boundary: Boundary,
-    chosen: bool,
-}
-
-impl Sizes {
-    /// From the option, or from the body's width and its thickness beneath the domain; a contact has room in the domain.
-    pub fn of(options: &Options, mesh: &Mesh) -> Result<Self> {
-        let scale = match options.push {
-            Some(push) => push / PUSH_MM,
-            None => ToolScale::of_body(BodySize::of(mesh)).factor,
-        };
-        let domain: f64 = mesh
-            .domain
-            .iter()
-            .map(|&row| face_area(&mesh.positions, mesh.surface[row as usize]))
-            .sum();
-        let area_mm2 = AREA_MM2.map(|area| area * scale * scale);
-        if domain < 1.3 * area_mm2[1] {
-            bail!(
-                "the domain has {domain:.0} mm², and a contact may take up to {:.0} mm²: widen --domain, or make the bundle for smaller tools with --push {:.1}",
-                area_mm2[1],
-                0.9 * PUSH_MM * scale * (domain / (1.3 * area_mm2[1])).sqrt()
-            );
-        }
-        Ok(Self {
-            push_mm: PUSH_MM * scale,
-            area_mm2,
-            boundary: options.boundary,
-            chosen: options.push.is_some(),
-        })
-    }
-
-    /// Corrections a step that the bundle recommends: as asked, or with a target that is the same part of the deepest push for every body.
-    pub fn corrections(&self, options: &Options) -> Effort {
-        options.corrections.unwrap_or_else(|| {
-            let target = f64::from(CORRECTIONS.target_mm) * self.push_mm / PUSH_MM;
-            // Two digits say enough.
-            let short = format!("{target:.1e}")
-                .parse()
-                .unwrap_or(CORRECTIONS.target_mm);
-            Effort {
-                target_mm: short,
-                ..CORRECTIONS
-            }
-        })
-    }
-
-    /// A line for the user.
-    pub fn words(&self) -> String {
-        format!(
-            "made for pushes of up to {:.1} mm and contacts of {:.0} to {:.0} mm² ({})",
-            self.push_mm,
-            self.area_mm2[0],
-            self.area_mm2[1],
-            if self.chosen {
-                "--push"
-            } else {
-                "from the body's width and its thickness there; --push changes it"
-            }
-        )
-    }
-
-    /// What the preview says besides the mesh.
-    pub fn scene(&self, mesh: &Mesh) -> Vec<(String, String)> {
-        vec![
-            ("name".into(), mesh.name.clone()),
-            ("nodes".into(), mesh.node_count().to_string()),
-            ("tetrahedra".into(), mesh.tets.len().to_string()),
-            (
-                "held nodes".into(),
-                mesh.held_nodes(self.boundary).len().to_string(),
-            ),
-            ("domain faces".into(), mesh.domain.len().to_string()),
-            ("deepest push, mm".into(), format!("{:.1}", self.push_mm)),
-        ]
     }
 }

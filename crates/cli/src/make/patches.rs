@@ -5,7 +5,7 @@ use tissue::linear::{Compliance, contact_forces};
 use tissue::mesh::Mesh;
 use tissue::schemes::SplitMix;
 
-use super::options::Sizes;
+use super::sizes::Sizes;
 
 /// Forces of one contact, mN: dof of the contact nodes (`3 * row + axis`) and value.
 pub type Forces = Vec<(u32, f32)>;

@@ -14,9 +14,10 @@ use tissue::mesh::Mesh;
 use tissue::tensors::{Dtype, Tensor, write_file};
 
 use super::clock::{self, Clock};
-use super::options::{Options, Sizes};
+use super::options::Options;
 use super::patches::{self, Forces};
 use super::projected::Projected;
+use super::sizes::Sizes;
 use super::stages::Stage;
 use super::vibration::{self, Modes};
 use crate::progress;

@@ -1,6 +1,7 @@
 //! `upt make` as a user calls it: a small organ end to end, killed at each stage, and input that cannot become a bundle.
 
 mod defaults;
+mod hanging;
 mod interrupted;
 mod refused;
 mod relaxing;
@@ -9,7 +10,6 @@ mod short_time;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use refused::refused;
 use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
 
 /// An ellipsoid with half axes 50, 40 and 30 mm as an OBJ, with `bend` applied to each point.
@@ -212,7 +212,7 @@ fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
     let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
     plain(&surface);
     let law = ["--law", "mooney-rivlin:1", "--relaxation", "0.3,0.1,0.3,1"];
-    let asked = [&law[..], &["--tools", "press,lift"]].concat();
+    let asked = [&law[..], &hanging::OPTIONS, &["--tools", "press,lift"]].concat();
     let output = command(&surface, &out, &[&HELD[..], &asked].concat())
         .output()
         .unwrap();
@@ -229,6 +229,7 @@ fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
         assert!(requires.iter().any(|name| name == part), "{requires:?}");
     }
     relaxing::falls_as_the_solvers(&out);
+    hanging::hangs_as_it_was_scanned(&out);
     // Measured against the reference solver with the same law.
     let certificate = read("certificate.json");
     let share = certificate["contact"]["share_of_linear"].as_f64().unwrap();
@@ -293,35 +294,6 @@ fn pushes_that_invert_the_solvers_elements_are_told_and_what_came_before_counts(
     let told = runs.any(|said| said.contains("of them ended early at a load"));
     assert!(told, "not even with 12 minutes");
     works(&out);
-}
-
-#[test]
-fn parts_that_the_file_names_are_held_and_stiffer() {
-    let folder = tempfile::tempdir().unwrap();
-    let surface = folder.path().join("named.obj");
-    plain(&surface);
-    let mut text = std::fs::read_to_string(&surface).unwrap();
-    // The last faces are three sectors of sixteen.
-    let at = text.match_indices("f ").map(|(at, _)| at).nth(208).unwrap();
-    text.insert_str(at, "usemtl ligament\n");
-    std::fs::write(&surface, text).unwrap();
-    let out = surface.with_extension("bundle");
-    let arguments = [
-        "--fixed",
-        "group:ligament",
-        "--stiffness",
-        "ball:0,0,0,15=4",
-        "--pressure",
-        "bed=group:ligament",
-        "--preview",
-    ];
-    let output = command(&surface, &out, &arguments).output().unwrap();
-    let said = crate::text(&output);
-    assert!(output.status.success(), "{said}");
-    assert!(said.contains("4 times the stiffness"), "{said}");
-    assert!(said.contains("region `bed`: "), "{said}");
-    let message = refused(&surface, &["--fixed", "group:tendon"]);
-    assert!(message.contains("tendon") && message.contains("ligament"));
 }
 
 #[test]

@@ -68,6 +68,20 @@ fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
     );
 
     has(
+        refused(&good, &[HELD[0], HELD[1], "--gravity", "0,-9.81"]),
+        &["--gravity", "three numbers"],
+    );
+    has(
+        refused(&good, &[HELD[0], HELD[1], "--unload"]),
+        &["--unload", "--gravity"],
+    );
+    let heavy = ["--gravity", "0,0,-900", "--unload", "--young", "100"];
+    has(
+        refused(&good, &[&HELD[..], &heavy].concat()),
+        &["--unload", "no rest shape", "stiffer material"],
+    );
+
+    has(
         refused(&good, &[HELD[0], HELD[1], "--tools", "press,saw"]),
         &["--tools: ", "`saw` is unknown", "stroke"],
     );

@@ -16,6 +16,15 @@ pub(crate) struct StrainEnergy {
     moduli: Moduli,
 }
 
+/// A material's moduli in mN/mm².
+pub(super) fn moduli(material: &Material) -> Moduli {
+    Moduli {
+        shear_pa: material.shear_pa() * 1e-3,
+        bulk_pa: material.bulk_pa() * 1e-3,
+        law: material.law,
+    }
+}
+
 /// The energy and its least volume ratio at one displacement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Energy {
@@ -34,11 +43,7 @@ impl StrainEnergy {
         });
         Self {
             elements: elements.collect(),
-            moduli: Moduli {
-                shear_pa: material.shear_pa() * 1e-3,
-                bulk_pa: material.bulk_pa() * 1e-3,
-                law: material.law,
-            },
+            moduli: moduli(material),
         }
     }
 

@@ -12,6 +12,7 @@ pub(crate) mod energy;
 mod path;
 mod quasi_newton;
 mod relax;
+mod unload;
 
 use std::path::Path as FilePath;
 
@@ -28,6 +29,7 @@ use crate::trajectory::{Trajectory, TrajectoryHeader};
 use energy::StrainEnergy;
 use path::{Equilibrium, Path};
 pub use relax::relax;
+pub use unload::unload;
 
 /// Root mean square over the nodes of the last step to an equilibrium, mm.
 pub const TOLERANCE_MM: f64 = 5e-4;

@@ -5,6 +5,7 @@ use tissue::solver::{
     ContactNode, FrameReport, Loads, Solver, SolverError, SolverOptions, SupportMotion,
     SurfacePressure,
 };
+use tissue::statics;
 
 /// 1000 kg/m³ under 0.5 m/s², in N/m³.
 const WEIGHT: f64 = 500.0;
@@ -114,6 +115,47 @@ fn a_body_under_pressure_has_the_closed_form() {
             assert!(off < 1e-3, "{position:?}: {u:?}, not {wanted} along {axis}");
         }
     }
+}
+
+/// A body that was scanned under its weight: the solver takes the rest shape that is found for it back to the scan.
+#[test]
+fn a_rest_shape_hangs_as_it_was_scanned() {
+    let scan = box_phantom([60.0, 60.0, 30.0], [5, 5, 3]).unwrap();
+    let settings = options(0.45, 60.0);
+    let gravity = [6.0, 0.0, 8.0];
+    let rest = statics::unload(&scan, &scan.fixed, &settings.material, gravity).unwrap();
+    let mut mesh = scan.clone();
+    let mut farthest = 0.0f64;
+    for (position, own) in mesh.positions.iter_mut().zip(&rest) {
+        let way = (0..3).map(|k| (own[k] - f64::from(position[k])).powi(2));
+        farthest = farthest.max(way.sum::<f64>().sqrt());
+        *position = own.map(|x| x as f32);
+    }
+    let mut solver = Solver::new(&mesh, Boundary::Fixed, settings).unwrap();
+    let load = Loads {
+        gravity: gravity.map(|g| 1e3 * g),
+        ..Loads::default()
+    };
+    solver.set_loads(&load).unwrap();
+    settle(&mut solver, &[], 40);
+    let mut most = 0.0f64;
+    for ((there, u), wanted) in (mesh.positions.iter())
+        .zip(displacement(&solver, &mesh))
+        .zip(&scan.positions)
+    {
+        for axis in 0..3 {
+            most = most.max(f64::from((there[axis] + u[axis] - wanted[axis]).abs()));
+        }
+    }
+    println!("{farthest:.2} mm between scan and rest, {most:.1e} mm off");
+    assert!(farthest > 3.0 && most < 1e-3, "{farthest} mm, {most} mm");
+    // Of a weight that no such tissue bears nothing is made up.
+    let soft = tissue::material::Material {
+        young_pa: 30.0,
+        ..options(0.45, 60.0).material
+    };
+    let error = statics::unload(&scan, &scan.fixed, &soft, [0.0, 0.0, -400.0]).unwrap_err();
+    assert!(error.to_string().contains("no rest shape"), "{error}");
 }
 
 /// Without damping the work of all loads is strain energy and motion.

@@ -13,7 +13,8 @@ use serde_json::json;
 use tissue::schemes::{FRAMES, SplitMix};
 use upt::Corrections;
 
-use super::options::{Options, Sizes};
+use super::options::Options;
+use super::sizes::Sizes;
 use super::stages::Stage;
 use super::{bundle, refine};
 use crate::check::{Certificate, Recording};
