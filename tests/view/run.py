@@ -22,6 +22,7 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
+from breathing import an_organ_breathes_with_what_hangs_on_it, the_button_breathes
 from client import Browser, RawClient, Refused
 from running import COMMAND, ROOT, TOOL, connect_when_free, frame, pressing, server, take, tip_of_the_phantom
 from surgery import a_blade_cuts_and_undo_heals, the_mouse_operates
@@ -295,6 +296,7 @@ def main() -> int:
         a_flood_of_messages_gets_one_answer_for_many,
         a_replay_makes_the_steps_of_the_recording_again,
         a_blade_cuts_and_undo_heals,
+        an_organ_breathes_with_what_hangs_on_it,
     ]
     passed = failed = skipped = 0
     try:
@@ -307,6 +309,7 @@ def main() -> int:
     if browser:
         runs.append(("a_drag_moves_the_surface", lambda: a_drag_moves_the_surface(browser, "brain-reduced")))
         runs.append(("the_mouse_operates", lambda: the_mouse_operates(browser, BUNDLES / "brain-reduced", PICTURES)))
+        runs.append(("the_button_breathes", lambda: the_button_breathes(browser, BUNDLES / "liver-coarse", PICTURES)))
         runs.append(("a_report_plays_its_first_case", lambda: a_report_plays_its_first_case(browser, "liver-coarse")))
         runs.append(("a_report_of_tools_shows_them", lambda: a_report_of_tools_shows_them(browser, "liver-coarse")))
     try:

@@ -16,7 +16,7 @@ from client import RawClient, Refused
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = os.environ.get("UPT_COMMAND", str(ROOT / "target/release/upt"))
 TOOL = {"position": [0, 0, 0], "rotation": [0, 0, 0, 1], "radius": 5, "half_length": 20, "friction": 0.3}
-HEADER = 30  # numbers before the displacements
+HEADER = 36  # numbers before the displacements
 
 
 @contextmanager
@@ -45,6 +45,8 @@ class Frame(NamedTuple):
     removed: float
     copies: int
     undos: int
+    height: float
+    torn: int
     places: int
 
 
@@ -57,7 +59,19 @@ def take(client: RawClient) -> Frame:
     head = data[: 4 * HEADER]
     words, numbers = struct.unpack(f"<{HEADER}I", head), struct.unpack(f"<{HEADER}f", head)
     places = (len(data) - len(head)) // 12
-    return Frame(words[0], words[11], numbers[9], numbers[6:9], numbers[25], numbers[26], words[27], words[28], places)
+    return Frame(
+        words[0],
+        words[11],
+        numbers[9],
+        numbers[6:9],
+        numbers[25],
+        numbers[26],
+        words[27],
+        words[28],
+        numbers[30],
+        words[35],
+        places,
+    )
 
 
 def frame(client: RawClient, tool: dict | None, sequence: int) -> Frame:

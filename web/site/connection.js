@@ -1,7 +1,7 @@
 // The page of `cargo xtask site`: what the server of `upt view` is there, a worker is here (crates/cli/src/view/protocol.rs).
 import { Tissue } from "./libupt/worker.js";
 
-const HEADER = 30;
+const HEADER = 36;
 
 export function connect({ hello, geometry, frame, tell }) {
   let tissue;

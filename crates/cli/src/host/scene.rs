@@ -106,11 +106,49 @@ impl Scene {
         check(unsafe { ffi::upt_scene_step(self.handle, &input, std::ptr::null_mut(), 0) }).is_ok()
     }
 
-    /// `upt_scene_submit`: as [`Scene::step_instruments`], on the scene's worker.
-    pub fn submit_instruments(&mut self, instruments: &[ffi::upt_instrument]) -> Result<()> {
-        let input = ffi::upt_input::of_instruments(instruments);
-        // SAFETY: the pointer and count describe the list, which the call copies.
-        check(unsafe { ffi::upt_scene_submit(self.handle, &input) })
+    /// `upt_scene_submit`: a step on the scene's worker. What the input points to must be there; the call copies it.
+    pub fn submit(&mut self, input: &ffi::upt_input) -> Result<()> {
+        // SAFETY: the caller's lists live across the call.
+        check(unsafe { ffi::upt_scene_submit(self.handle, input) })
+    }
+
+    /// `upt_scene_bed` about a place, with stiffness (N/m) and strength (mN); none for a body that has been cut.
+    pub fn bed(
+        &mut self,
+        centre: [f32; 3],
+        radius_mm: f32,
+        [stiffness, break_mn]: [f32; 2],
+    ) -> Result<Option<Vec<ffi::upt_tie>>> {
+        // SAFETY: zeros are valid numbers.
+        let mut bed: ffi::upt_bed = unsafe { zeroed() };
+        bed.struct_size = size::<ffi::upt_bed>();
+        (bed.centre, bed.radius_mm) = (centre, radius_mm);
+        (bed.stiffness, bed.break_mn) = (stiffness, break_mn);
+        let mut ties = vec![ffi::upt_tie::NONE; upt::MAX_TIES];
+        let mut count = 0;
+        let room = ties.len() as u64;
+        // SAFETY: the pointers and counts describe the structs, which live across the call.
+        let status =
+            unsafe { ffi::upt_scene_bed(self.handle, &bed, ties.as_mut_ptr(), room, &mut count) };
+        if status == ffi::UPT_ERR_UNSUPPORTED {
+            return Ok(None);
+        }
+        check(status)?;
+        ties.truncate(count as usize);
+        Ok(Some(ties))
+    }
+
+    /// `upt_scene_tie_readings` of the last step's `count` ties.
+    pub fn tie_readings(&self, count: usize) -> Result<Vec<ffi::upt_tie_reading>> {
+        // SAFETY: zeros are valid numbers.
+        let mut blank: ffi::upt_tie_reading = unsafe { zeroed() };
+        blank.struct_size = size::<ffi::upt_tie_reading>();
+        let mut readings = vec![blank; count];
+        // SAFETY: the pointer and count describe the list.
+        check(unsafe {
+            ffi::upt_scene_tie_readings(self.handle, readings.as_mut_ptr(), count as u64)
+        })?;
+        Ok(readings)
     }
 
     /// `upt_scene_wait`: until no step is in flight; what became of it does not matter here.

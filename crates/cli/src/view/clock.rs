@@ -67,6 +67,11 @@ impl Clock {
         self.place(self.step)
     }
 
+    /// The moment of the step that has begun.
+    pub fn moment(&self) -> f64 {
+        self.step
+    }
+
     /// The step's state is published.
     pub fn finished(&mut self) {
         self.in_flight = false;

@@ -4,8 +4,10 @@
 //! Only 127.0.0.1 is served, and only who knows the token of the printed address. What the two sides say to each other is
 //! in `protocol.rs`; a bad message closes the client that sent it and nothing else.
 
+mod breath;
 mod clock;
 mod http;
+mod instruments;
 mod protocol;
 mod server;
 mod session;

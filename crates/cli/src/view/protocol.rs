@@ -8,6 +8,7 @@
 //! {"reset": true}                    back to rest
 //! {"record": true}                   start a recording (false: end it)
 //! {"replay": true}                   from rest through the recording
+//! {"breathe": true}                  what holds the organ goes up and down (false: it does not), and a ball hangs on the organ
 //! {"undo": true}                     the body before the last stroke of a blade, aspirator or coagulator
 //! ```
 //!
@@ -31,8 +32,9 @@ pub const LONGEST_MESSAGE: usize = 1024;
 /// step ms, indicator, force x y z (mN), largest displacement (mm), ms that the frame took to make, steps (u32),
 /// corrections (u32), their estimated error (mm), deepest tissue inside of the tool (mm), then where the tool is in this frame: 1 or 0
 /// (u32), position x y z, rotation x y z w, radius, and what it is (u32: 0 presses, 1 blade, 2 aspirator, 3 coagulator); area cut (mm²), volume removed (mm³),
-/// copies of nodes (u32), strokes that can be undone (u32), ms that the last change of the body took. The force on a blade is in place of the pressing tool's.
-pub const HEADER: usize = 30;
+/// copies of nodes (u32), strokes that can be undone (u32), ms that the last change of the body took; how far up the organ's frame is (mm), where the ball is x y z and its radius (0: there
+/// is none), and how many of its ties have torn (u32). Tools and the ball are in the world, displacements in the organ's frame. The force on a blade is in place of the pressing tool's.
+pub const HEADER: usize = 36;
 /// No organ and no tool is larger, mm.
 const FARTHEST: f32 = 10_000.0;
 /// No tool rubs more.
@@ -75,6 +77,7 @@ pub enum Wish {
     Reset,
     Record(bool),
     Replay,
+    Breathe(bool),
     Undo,
 }
 
@@ -87,6 +90,7 @@ struct Message {
     reset: Option<bool>,
     record: Option<bool>,
     replay: Option<bool>,
+    breathe: Option<bool>,
     undo: Option<bool>,
 }
 
@@ -106,6 +110,7 @@ impl Wish {
             message.reset.filter(|yes| *yes).map(|_| Wish::Reset),
             message.record.map(Wish::Record),
             message.replay.filter(|yes| *yes).map(|_| Wish::Replay),
+            message.breathe.map(Wish::Breathe),
             message.undo.filter(|yes| *yes).map(|_| Wish::Undo),
         ];
         let mut given = given.into_iter().flatten();
@@ -115,7 +120,9 @@ impl Wish {
                 Ok(Wish::Tool(Some(tool), sequence))
             }
             (Some(wish), None) => Ok(wish),
-            _ => Err("a message must hold one of tool, reset, record, replay, undo".into()),
+            _ => {
+                Err("a message must hold one of tool, reset, record, replay, breathe, undo".into())
+            }
         }
     }
 }
@@ -191,6 +198,8 @@ mod tests {
         );
         assert_eq!(Wish::parse(r#"{"reset":true}"#), Ok(Wish::Reset));
         assert_eq!(Wish::parse(r#"{"undo":true}"#), Ok(Wish::Undo));
+        let breathe = Wish::parse(r#"{"breathe":true}"#);
+        assert_eq!(breathe, Ok(Wish::Breathe(true)));
         let blade = tool.replace(r#""friction":0.3"#, r#""friction":0.3,"kind":"blade""#);
         let Ok(Wish::Tool(Some(read), _)) = Wish::parse(&blade) else {
             panic!()

@@ -10,13 +10,13 @@ use anyhow::Result;
 use tungstenite::Message;
 use upt::ffi;
 
+use super::breath::Breath;
 use super::clock::{Clock, between};
+use super::instruments::pressing;
 use super::protocol::{HEADER, Hello, Kind, SurfaceHeader, Tool, Wish};
 use super::surgery::Surgery;
-use crate::host::{Model, Scene, instrument};
+use crate::host::{Model, Scene};
 
-/// From this friction on, nodes that are moved by the tool stick to it.
-const STICKS: f32 = 0.5;
 /// A recording ends after so many steps: a quarter of an hour of 20 ms.
 const LONGEST_RECORDING: usize = 45_000;
 
@@ -55,6 +55,7 @@ pub struct Session {
     frame_ms: f32,
     /// What changes the body, and what the page is to be told of it.
     surgery: Surgery,
+    breath: Breath,
     news: Vec<(SurfaceHeader, Vec<u8>)>,
     displacement: Vec<[f32; 3]>,
     force: [f32; 3],
@@ -105,6 +106,7 @@ impl Session {
             penetration_mm: 0.0,
             frame_ms: 0.0,
             surgery: Surgery::new(model)?,
+            breath: Breath::default(),
             news: Vec::new(),
             force: [0.0; 3],
             bytes: Vec::new(),
@@ -151,11 +153,17 @@ impl Session {
                 self.recording = None;
                 self.replayed = Some(0);
             }
-            Wish::Undo => {
-                self.scene.settle();
-                if self.clock.in_flight() {
-                    self.clock.finished();
+            Wish::Breathe(on) => {
+                self.pause();
+                self.breath = Breath::default();
+                if on && self.presents {
+                    let surface = (self.rest.as_slice(), self.faces.as_slice());
+                    self.breath =
+                        Breath::begin(&mut self.scene, self.framed, surface, &self.domain)?;
                 }
+            }
+            Wish::Undo => {
+                self.pause();
                 self.surgery.undo(&mut self.scene)?;
                 self.look()?;
             }
@@ -168,8 +176,16 @@ impl Session {
         self.asked
     }
 
+    fn pause(&mut self) {
+        self.scene.settle();
+        if self.clock.in_flight() {
+            self.clock.finished();
+        }
+    }
+
     fn rest_again(&mut self) -> Result<()> {
         self.scene.settle();
+        self.breath = Breath::default();
         self.clock = Clock::new(self.dt);
         self.tool = None;
         self.replayed = None;
@@ -216,13 +232,13 @@ impl Session {
         };
         self.clock.moved(now, self.shown);
         let since = self.clock.since(now);
+        let framed = self.breath.in_frame(self.shown, now);
+        let instruments = (self.breath.with(pressing(framed.as_ref()), now)).instruments;
         if self.surgery.begun {
             self.displacement.resize(self.surgery.vertices(), [0.0; 3]);
-            let instruments = pressing(self.shown.as_ref());
             self.scene
                 .present_surface(since, &instruments, &mut self.displacement)?;
         } else if self.presents {
-            let instruments = pressing(self.shown.as_ref());
             self.scene
                 .present(since, &instruments, &mut self.displacement)?;
         } else {
@@ -259,7 +275,8 @@ impl Session {
     fn step(&mut self, now: f64) -> Result<()> {
         let instruments = self.begin(now)?;
         if self.solves {
-            return self.scene.submit_instruments(&instruments);
+            let breathing = self.breath.with(instruments, self.clock.moment());
+            return self.scene.submit(&self.breath.input(&breathing));
         }
         self.step_nodes(&instruments)?;
         self.clock.finished();
@@ -282,6 +299,7 @@ impl Session {
         {
             recording.push(tool);
         }
+        let tool = self.breath.in_frame(tool, self.clock.moment());
         if self.presents {
             self.surgery.operate(&mut self.scene, tool, self.dt)?;
             self.look()?;
@@ -293,8 +311,10 @@ impl Session {
 
     /// What the finished step says about its tool.
     fn read(&mut self) -> Result<()> {
-        let readings = self.scene.readings(self.count)?;
-        let first = readings.first();
+        let place = self.breath.place_of_tool();
+        let readings = self.scene.readings(place + self.count)?;
+        self.breath.read(&self.scene)?;
+        let first = readings.get(place);
         self.force = first.map_or([0.0; 3], |reading| reading.force);
         self.penetration_mm = first.map_or(0.0, |reading| reading.penetration_mm);
         self.contacts = first.map_or(0, |reading| reading.contact_count);
@@ -323,16 +343,15 @@ impl Session {
         let state = u32::from(self.recording.is_some())
             | (u32::from(self.replayed.is_some()) << 1)
             | (u32::from(stats.sleeping) << 2);
-        let (place, turn, radius) = self
-            .shown
-            .map_or(([0.0; 3], [0.0, 0.0, 0.0, 1.0], 0.0f32), |tool| {
-                (tool.position, tool.rotation, tool.radius)
-            });
+        let nowhere = ([0.0; 3], [0.0, 0.0, 0.0, 1.0], 0.0f32);
+        let (place, turn, radius) =
+            (self.shown).map_or(nowhere, |tool| (tool.position, tool.rotation, tool.radius));
         let force = match self.shown {
             Some(tool) if tool.kind != Kind::Press => self.surgery.force,
             _ => self.force,
         };
         let account = self.surgery.account;
+        let [x, y, z, ball] = self.breath.ball(self.framed);
         let header: [[u8; 4]; HEADER] = [
             self.sequence.to_le_bytes(),
             stats.flags.to_le_bytes(),
@@ -364,6 +383,12 @@ impl Session {
             account.copies.to_le_bytes(),
             (self.surgery.undo_count() as u32).to_le_bytes(),
             self.surgery.change_ms.to_le_bytes(),
+            self.breath.height(self.framed).to_le_bytes(),
+            x.to_le_bytes(),
+            y.to_le_bytes(),
+            z.to_le_bytes(),
+            ball.to_le_bytes(),
+            self.breath.torn.to_le_bytes(),
         ];
         self.bytes.clear();
         self.bytes.extend(header.as_flattened());
@@ -371,28 +396,5 @@ impl Session {
             self.bytes.extend(x.to_le_bytes());
         }
         Ok(&self.bytes)
-    }
-}
-
-/// The instruments of a tool: none where it does something else than press.
-fn pressing(tool: Option<&Tool>) -> Vec<ffi::upt_instrument> {
-    let presses = tool.filter(|tool| tool.kind == Kind::Press);
-    presses.into_iter().map(capsule).collect()
-}
-
-fn capsule(tool: &Tool) -> ffi::upt_instrument {
-    ffi::upt_instrument {
-        shape: ffi::UPT_SHAPE_CAPSULE,
-        position: tool.position,
-        rotation: tool.rotation,
-        half_extents: [0.0, tool.half_length, 0.0],
-        radius: tool.radius,
-        sticking: u8::from(tool.grasp || tool.friction >= STICKS),
-        mode: match tool.grasp {
-            true => ffi::UPT_MODE_GRASP,
-            false => ffi::UPT_MODE_SLIDE,
-        },
-        friction: tool.friction,
-        ..instrument()
     }
 }

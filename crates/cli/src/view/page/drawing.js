@@ -66,6 +66,12 @@ export function steelMaterial() {
   return new three.MeshStandardMaterial({ color: 0x9fb4c8, metalness: 0.6, roughness: 0.35 });
 }
 
+// What hangs on the organ.
+export function ballMaterial() {
+  if (software) return atCorners(false, 0x5d8f4a, 0.2);
+  return new three.MeshStandardMaterial({ color: 0x6fa557, roughness: 0.45 });
+}
+
 // How far a tool reaches.
 export function reachMaterial() {
   const material = software ? atCorners(false, 0xf2b84b, 0) : new three.MeshStandardMaterial({ color: 0xf2b84b });

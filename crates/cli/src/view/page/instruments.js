@@ -1,6 +1,6 @@
 // What the mouse holds: a tool that presses, a blade, an aspirator, a coagulator, as they are shown.
 import * as three from "./three.js";
-import { reachMaterial, steelMaterial } from "./drawing.js";
+import { ballMaterial, reachMaterial, steelMaterial } from "./drawing.js";
 import { HALF_LENGTH } from "./hand.js";
 
 export const KINDS = ["press", "blade", "aspirator", "coagulator"]; // in the order of protocol.rs
@@ -47,5 +47,26 @@ export class ShownTool {
     this.#body.scale.set(1, 1, kind === "blade" ? FLAT : 1);
     this.#reach.geometry.dispose();
     this.#reach.geometry = new three.CapsuleGeometry(radius, 0.01, 6, 16);
+  }
+}
+
+/** A ball that hangs on the organ, as a gall bladder on the liver. */
+export class Hanging {
+  #ball = new three.Mesh(new three.BufferGeometry(), ballMaterial());
+  #radius = 0;
+
+  constructor(scene) {
+    scene.add(this.#ball);
+    this.#ball.visible = false;
+  }
+
+  /** Without a radius there is none. */
+  place([x, y, z, radius]) {
+    this.#ball.visible = radius > 0;
+    this.#ball.position.set(x, y, z);
+    if (radius === this.#radius || !(radius > 0)) return;
+    this.#radius = radius;
+    this.#ball.geometry.dispose();
+    this.#ball.geometry = new three.CapsuleGeometry(radius, 0.01, 12, 32);
   }
 }

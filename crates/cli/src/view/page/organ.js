@@ -108,6 +108,14 @@ export class Organ {
     return true;
   }
 
+  /** What holds the organ is so far up. */
+  lift(height) {
+    for (const mesh of [...this.shown, this.picked]) {
+      mesh.position.z = height;
+      mesh.updateMatrixWorld();
+    }
+  }
+
   #empty(i) {
     const first = i - (i % 3);
     return this.#slots[first] === this.#slots[first + 1];

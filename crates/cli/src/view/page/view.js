@@ -6,11 +6,11 @@ import { makeRenderer, software, whenDrawn } from "./drawing.js";
 import { connect } from "./connection.js";
 import { gltf } from "./gltf.js";
 import { HALF_LENGTH, Hand } from "./hand.js";
-import { KINDS, ShownTool, radiusOf } from "./instruments.js";
+import { Hanging, KINDS, ShownTool, radiusOf } from "./instruments.js";
 import { Organ } from "./organ.js";
 import { ForcePlot } from "./plot.js";
 
-const HEADER = 30;
+const HEADER = 36;
 const READOUTS = 250; // ms between two of the readouts
 const AHEAD = 2; // frames that are asked for and have not come
 const OFTEN = 0.998; // of the frames come in time for their picture
@@ -55,6 +55,7 @@ let hello; // the server's first message
 let organ; // what is shown
 let kind = "press"; // what the mouse holds
 const tool = new ShownTool(scene);
+const hanging = new Hanging(scene);
 let pointer; // {x, y, last} while the tool is held: where the mouse is, since when
 let moves = []; // when it moved since a frame was asked for
 let hand; // while the tool is held
@@ -138,6 +139,11 @@ function take(data) {
   status.copies = words[27];
   status.undos = words[28];
   status.changeMs = numbers[29];
+  status.height = numbers[30];
+  status.ball = numbers[34];
+  status.torn = words[35];
+  organ.lift(status.height);
+  hanging.place(numbers.subarray(31, 35));
   if (words[15] === 0) tool.hide();
   else tool.place(words[24], numbers.subarray(16));
 }
@@ -156,6 +162,8 @@ function readOut() {
   show("area", `${(status.area / 100).toFixed(2)} cm²`);
   show("removed", `${(status.removed / 1000).toFixed(2)} cm³`);
   show("copies", String(status.copies));
+  at("hanging").hidden = status.ball === 0;
+  show("torn", String(status.torn));
   show("change", `${status.changeMs.toFixed(1)} ms`);
   const raised = FLAGS.filter((_, bit) => (status.flags & (1 << bit)) !== 0);
   show("flags", raised.join(", "));
@@ -269,7 +277,15 @@ for (const [id, unit] of [["depth", " mm"], ["radius", " mm"], ["friction", ""]]
   at(id).addEventListener("input", label);
   label();
 }
-at("reset").addEventListener("click", () => say({ reset: true }));
+at("reset").addEventListener("click", () => {
+  at("breathe").setAttribute("aria-pressed", "false");
+  say({ reset: true });
+});
+at("breathe").addEventListener("click", () => {
+  const on = at("breathe").getAttribute("aria-pressed") !== "true";
+  at("breathe").setAttribute("aria-pressed", String(on));
+  say({ breathe: on });
+});
 at("undo").addEventListener("click", () => say({ undo: true }));
 addEventListener("keydown", (event) => {
   if ((event.ctrlKey || event.metaKey) && event.key === "z") at("undo").click();
@@ -282,7 +298,10 @@ for (const button of choices) {
   });
 }
 at("record").addEventListener("click", () => say({ record: !status.recording }));
-at("replay").addEventListener("click", () => say({ replay: true }));
+at("replay").addEventListener("click", () => {
+  at("breathe").setAttribute("aria-pressed", "false");
+  say({ replay: true });
+});
 status.nodes = () => hello.node_count;
 status.dt = () => 1000 * hello.dt;
 status.gltf = () => gltf(organ.whole, hello.bundle);
