@@ -16,6 +16,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -185,6 +186,7 @@ public:
   /// The moment of the end of the step on a clock of your own, s.
   Input &at(double time_s) noexcept { return raw_.time_s = time_s, *this; }
   /// Gravity and that of the scan, m/s², in the mesh's frame: the difference acts on the body.
+  /// Zeros for the scan: the bundle's.
   Input &gravity(const std::array<float, 3> &now,
                  const std::array<float, 3> &at_rest = {}) noexcept {
     std::copy(now.begin(), now.end(), raw_.gravity);
@@ -777,6 +779,11 @@ public:
   /// `model.info().dt` where that is 0.
   explicit FrameClock(double dt) : dt_(dt) {}
 
+  /// What acts beside the instruments (gravity, pressures, ties, what holds the organ): `fill` is
+  /// called with the input of each step that this clock makes, and its moment, s. What the input
+  /// points to must stay until the call that made the step returns.
+  void load(std::function<void(Input &, double)> fill) { load_ = std::move(fill); }
+
   /// One frame: takes a finished step, writes the tissue at `now` with the instruments where they
   /// are now, and submits the next step when it is due. Never waits for a step in flight.
   ///
@@ -800,7 +807,7 @@ public:
     if (status == UPT_OK && due(now)) {
       look(scene);
       const std::vector<upt_instrument> &poses = start(now);
-      status = upt_scene_submit(scene.get(), Input(poses).get());
+      status = upt_scene_submit(scene.get(), loaded(poses).get());
       if (status < 0) {
         in_flight_ = false;
       }
@@ -819,7 +826,9 @@ public:
     if (in_flight_) {
       upt_scene_wait(scene.get(), 0xFFFFFFFFU);
     }
+    std::function<void(Input &, double)> load = std::move(load_);
     *this = FrameClock(dt_);
+    load_ = std::move(load);
     return scene.reset();
   }
 
@@ -898,7 +907,7 @@ private:
         break;
       }
       const std::vector<upt_instrument> &poses = start(now);
-      const upt_status status = upt_scene_step(scene.get(), Input(poses).get(), nullptr, 0);
+      const upt_status status = upt_scene_step(scene.get(), loaded(poses).get(), nullptr, 0);
       finished();
       look(scene);
       if (status < 0) {
@@ -906,6 +915,15 @@ private:
       }
     }
     return UPT_OK;
+  }
+
+  // The input of the step that was started, with what acts at its moment.
+  Input loaded(const std::vector<upt_instrument> &poses) const {
+    Input input(poses);
+    if (load_) {
+      load_(input, step_);
+    }
+    return input;
   }
 
   // Whether a step has been published since the last look; poll() may not have told yet.
@@ -984,6 +1002,7 @@ private:
   bool started_ = false, in_flight_ = false, landed_now_ = false, presents_ = true;
   std::vector<Moment> queue_;
   std::vector<upt_instrument> poses_;
+  std::function<void(Input &, double)> load_;
 };
 
 } // namespace upt

@@ -1,8 +1,9 @@
 // A simulator with a window: a brain that a spatula presses, stepped by libupt beside the frame.
 //
-//   simulator BUNDLE [--size WxH] [--scale MM]
+//   simulator BUNDLE [--size WxH] [--scale MM] [--breathe]
 //   simulator BUNDLE --headless --frames N [--screenshot OUT.png]
 //
+// With --breathe what holds the organ goes up and down, and the organ lags behind.
 // Headless, a script plays the mouse: the spatula comes to a flat place of the domain and presses;
 // time passes at 60 frames a second whatever the machine does, so that the picture depends on N
 // alone.
@@ -19,7 +20,7 @@
 
 struct Options {
   std::string bundle, screenshot;
-  bool headless = false;
+  bool headless = false, breathe = false;
   long frames = -1;
   int width = 1280, height = 800;
   float scale_mm = 10;
@@ -37,6 +38,8 @@ static Options parse(int argc, char **argv) {
     };
     if (word == "--headless") {
       options.headless = true;
+    } else if (word == "--breathe") {
+      options.breathe = true;
     } else if (word == "--frames") {
       options.frames = std::strtol(value(), nullptr, 10);
     } else if (word == "--screenshot") {
@@ -54,8 +57,8 @@ static Options parse(int argc, char **argv) {
     }
   }
   if (options.bundle.empty()) {
-    throw std::runtime_error("usage: simulator BUNDLE [--size WxH] [--scale MM] [--headless "
-                             "--frames N] [--screenshot OUT.png]");
+    throw std::runtime_error("usage: simulator BUNDLE [--size WxH] [--scale MM] [--breathe] "
+                             "[--headless --frames N] [--screenshot OUT.png]");
   }
   if (options.headless && options.frames < 1) {
     throw std::runtime_error("--headless needs --frames N");
@@ -116,6 +119,9 @@ static Ray read_mouse(Window &window, Camera &camera) {
 
 static void run(const Options &options) {
   Tissue tissue(options.bundle);
+  if (options.breathe) {
+    tissue.breathe();
+  }
   Window window(options);
   View view;
   view.create(tissue, options.scale_mm);

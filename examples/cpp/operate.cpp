@@ -1,12 +1,13 @@
-// A body that is cut, and one whose support moves, without a window.
+// A body that is cut, one that breathes, and one whose support groups move, without a window.
 //
 //   operate BUNDLE [SUPPORTED]
 //
 // BUNDLE: corrections in it, such as onnx/liver-coarse. A blade cuts a slit into the middle of the
 // domain, an aspirator takes tissue beside it, a ball presses the lip; each frame has the surface
-// of its own moment. Then all of it is undone. SUPPORTED: a bundle with support groups, the first
-// of which carries the organ up, lets it go and holds it again. Exit code 1: something is not as it
-// should be.
+// of its own moment. Then all of it is undone. Then the organ breathes, with a gall bladder that
+// hangs on its bed and is drawn off. SUPPORTED: a bundle with support groups, the first of which
+// carries the organ up, lets it go and holds it again. Exit code 1: something is not as it should
+// be.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -134,6 +135,50 @@ static void operate(const std::string &bundle) {
           "undo left a wound");
 }
 
+// The organ goes up and down with what holds it, by 15 mm in four seconds. A gall bladder, a ball
+// of 9 mm here, hangs on its bed: ties between it and the tissue below, which go with it. After two
+// seconds it is drawn off, and the bed tears. All of it is in the organ's frame, which breathes.
+static void breathe(const std::string &bundle) {
+  const upt::Model model = upt::Model::open(bundle);
+  upt::Scene scene(model);
+  const auto [middle, normal] = site(model);
+  upt_instrument bladder = upt::sphere(9);
+  const Vec3 rest = middle + normal * 9.5F;
+  put(bladder.position, rest);
+  auto region = upt::make<upt_bed>();
+  put(region.centre, middle);
+  region.radius_mm = 15;
+  region.stiffness = 300;
+  region.break_mn = 400;
+  std::vector<upt_tie> bed = scene.bed(region);
+  for (upt_tie &tie : bed) {
+    put(tie.place, vertex({tie.place, tie.place + 3}, 0) - rest); // in the ball's frame
+    tie.to = UPT_END_INSTRUMENT;
+  }
+  const float upright[4] = {0, 0, 0, 1};
+  float most = 0;
+  std::size_t torn = 0;
+  for (int step = 1; step <= 80; step++) {
+    const float t = 0.05F * static_cast<float>(step);
+    const float height[3] = {0, 0, 7.5F * (1 - std::cos(1.5707963F * t))};
+    put(bladder.position, rest + normal * (10 * std::max(t - 2, 0.0F)));
+    const upt::span<const upt_instrument> held(&bladder, 1);
+    scene.step(upt::Input(held).support(height, upright).ties(bed));
+    const upt_instrument_reading felt = scene.readings(1).front();
+    most = std::max(most, length(vertex({felt.force, felt.force + 3}, 0)));
+    const auto ties = scene.tie_readings(bed.size());
+    const std::size_t before = torn;
+    torn = static_cast<std::size_t>(std::count_if(
+        ties.begin(), ties.end(), [](const upt_tie_reading &tie) { return tie.broken != 0; }));
+    require(t > 2 || torn == 0, "the bed tears while the organ breathes");
+    require(torn >= before, "a torn tie holds again");
+  }
+  std::printf("a gall bladder on a bed of %zu ties: %zu torn, %.0f mN at most\n", bed.size(), torn,
+              static_cast<double>(most));
+  require(bed.size() > 3 && torn == bed.size(), "the bed has not torn");
+  require(most > 100 && most < 1000, "the bed bears another force");
+}
+
 // Where the nodes of the first group are on the average, from rest.
 static Vec3 mean_of(upt::Scene &scene, const std::vector<std::uint32_t> &nodes) {
   std::vector<float> u(3 * nodes.size());
@@ -191,6 +236,7 @@ int main(int argc, char **argv) {
   }
   try {
     operate(argv[1]);
+    breathe(argv[1]);
     if (argc > 2) {
       carry(argv[2]);
     }

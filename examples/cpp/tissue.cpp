@@ -1,6 +1,7 @@
 #include "tissue.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 static constexpr std::size_t STRIDE = Tissue::VERTEX_FLOATS;
@@ -119,8 +120,26 @@ void Tissue::advance(double now, const Contacts &contacts) {
   }
 }
 
+static float height_at(double now) {
+  return 7.5F * (1 - std::cos(1.5707963F * static_cast<float>(now)));
+}
+
+void Tissue::breathe() {
+  breathes_ = true;
+  clock_.load([](upt::Input &input, double moment) {
+    const float position[3] = {0, 0, height_at(moment)}, rotation[4] = {0, 0, 0, 1};
+    input.support(position, rotation);
+  });
+}
+
 void Tissue::frame(double now, upt::span<const upt_instrument> instruments) {
-  clock_.frame(scene_, now, instruments, displacement_);
+  // The library has all of it in the organ's frame, the mouse is in the world.
+  height_ = breathes_ ? height_at(now) : 0;
+  std::vector<upt_instrument> framed(instruments.begin(), instruments.end());
+  for (upt_instrument &instrument : framed) {
+    instrument.position[2] -= height_;
+  }
+  clock_.frame(scene_, now, framed, displacement_);
   if (clock_.landed()) {
     count_step(clock_.landed_instruments());
   }
@@ -174,10 +193,11 @@ void Tissue::fill(const std::vector<float> &displacement) {
   max_displacement_ = 0;
   for (std::size_t vertex = 0; vertex < surface_.size(); vertex++) {
     const Vec3 u = at(displacement, vertex);
-    const Vec3 p = rest_[surface_[vertex]] + u;
+    const Vec3 p = rest_[surface_[vertex]] + u + Vec3{0, 0, height_};
     const float size = length(u);
     const float values[STRIDE] = {p.x, p.y, p.z, 0, 0, 0, size, cavity_[vertex]};
     std::copy(values, values + STRIDE, &vertices_[STRIDE * vertex]);
+    ghost_[GHOST_FLOATS * vertex + 2] = rest_[surface_[vertex]].z + height_;
     ghost_[GHOST_FLOATS * vertex + 6] = size;
     max_displacement_ = std::max(max_displacement_, size);
   }

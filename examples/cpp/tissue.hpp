@@ -53,6 +53,10 @@ public:
   const upt_model_info &info() const { return info_; }
   upt_scene_stats stats() const { return scene_.stats(); }
   void reset();
+  // From now on what holds the organ goes up and down by 15 mm in four seconds.
+  void breathe();
+  // How far up the organ's frame is, mm.
+  float height() const { return height_; }
 
   // Per surface vertex: position 3, normal 3, displacement 1, cavity 1 (above 0 in a sulcus).
   static constexpr std::size_t VERTEX_FLOATS = 8;
@@ -90,5 +94,7 @@ private:
   bool in_flight_ = false, solves_contact_ = true;
   std::optional<upt_instrument_reading> reading_;
   std::uint64_t counted_steps_ = 0;
+  bool breathes_ = false;
+  float height_ = 0;
   double last_start_ = -1e9;
 };

@@ -3,6 +3,7 @@
 #   --seconds=S         how long, then quit (default: until the window is closed)
 #   --corrections=N, --target=MM, --substeps=N, --step=S
 #                       the tissue's properties of these names (default: what the bundle recommends)
+#   --breathe=MM        what holds the organ goes up and down by so much, once in four seconds
 #   --wait              each frame waits for the step in flight: the same pictures on every machine
 #   --screenshot=FILE   PNG of the window at the deepest push (needs a display)
 #   --check             assert what was shown; exit code 1 and a line FAILED when something is wrong
@@ -15,6 +16,7 @@ const HALF_EXTENTS := Vector3(6.0, 12.0, 1.0)
 const ROUNDING := 1.0
 const PERIOD := 2.0
 const LATER := 0.05
+const BREATH := 4.0
 
 var tissue: SoftTissue3D
 var spatula: MeshInstance3D
@@ -67,6 +69,9 @@ func _ready() -> void:
 	tissue.material_override = material
 	find_site()
 	tissue.hold(0.2, false, 0.0)
+	if options.has("breathe") and not tissue.breathe(0.001 * float(options["breathe"]), BREATH):
+		finish("could not breathe: " + tissue.message())
+		return
 	build_scene()
 	show_surface(rest)
 
@@ -149,6 +154,7 @@ func problem_of_all() -> String:
 		return "%d corrections were made in a step, %d at most are wanted" % [most_corrections, most]
 	# Ten seconds later, in slow frames: each makes the steps that came due before it.
 	tissue.release()
+	tissue.breathe(0.0, BREATH)
 	for i in 200:
 		now += LATER
 		tissue.frame(now)

@@ -5,10 +5,10 @@
  * clockwise faces as front, which `faces` takes into account).
  *
  * Script side: open(bundle), rest(), faces(), hold(friction, grasp, tear_off_mn), press(shape,
- * position, rotation, half_extents, radius), release(), frame(now), wait(), vertices(), step_ms(),
- * contact_count(), force(), penetration(), flags(), corrections_made(), error_mm(), message().
- * `press` and `release` say where the tool is now, `frame` makes the surface of this moment; steps
- * run on a worker meanwhile.
+ * position, rotation, half_extents, radius), release(), breathe(amplitude, period), frame(now),
+ * wait(), vertices(), step_ms(), contact_count(), force(), penetration(), flags(),
+ * corrections_made(), error_mm(), message(). `press` and `release` say where the tool is now,
+ * `frame` makes the surface of this moment; steps run on a worker meanwhile.
  *
  * Properties, in the inspector too; `open` reads them: corrections (1 to 64: the most that a step
  * in contact gets, 0: what the bundle recommends, -1: none), corrections_target_mm (fewer where the
@@ -81,7 +81,7 @@ static void put_vertices(void *instance, float scale, GDExtensionTypePtr array) 
     for (std::size_t i = 0; i < rest.size(); i += 3) {
       const float *p = &rest[i], *u = &moved[i];
       out[i] = (p[0] + scale * u[0]) * METRES;
-      out[i + 1] = (p[2] + scale * u[2]) * METRES;
+      out[i + 1] = (p[2] + scale * (u[2] + tissue.height())) * METRES;
       out[i + 2] = -(p[1] + scale * u[1]) * METRES;
     }
   });
@@ -134,6 +134,14 @@ static void press(void *instance, const GDExtensionConstTypePtr *arguments,
         std::memcpy(tool.half_extents, extents, sizeof tool.half_extents);
         tool.radius = static_cast<float>(real(arguments[4]));
         tissue.in_hand = true;
+      }));
+}
+
+/* breathe(amplitude [m], period [s]): what holds the organ goes up and down from now on. */
+static void breathe(void *instance, const GDExtensionConstTypePtr *arguments,
+                    GDExtensionTypePtr result) {
+  put(result, opened(instance, [&](Tissue &tissue) {
+        tissue.breathe(static_cast<float>(real(arguments[0])) / METRES, real(arguments[1]));
       }));
 }
 
@@ -298,6 +306,7 @@ static const GodotMethod METHODS[] = {
      3,
      {{"friction", T(FLOAT)}, {"grasp", T(BOOL)}, {"tear_off_mn", T(FLOAT)}}},
     {"release", release, T(BOOL), 0, {}},
+    {"breathe", breathe, T(BOOL), 2, {{"amplitude", T(FLOAT)}, {"period", T(FLOAT)}}},
     {"frame", frame, T(BOOL), 1, {{"now", T(FLOAT)}}},
     {"wait", wait, T(BOOL), 0, {}},
     {"vertices", vertices, T(PACKED_VECTOR3_ARRAY), 0, {}},

@@ -1,6 +1,7 @@
 #include "tissue.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -61,8 +62,29 @@ Tissue::Tissue(const std::string &bundle, const Effort &effort)
   vectors_.assign(rest_.size(), 0);
 }
 
+static float up(float amplitude, double period, double now) {
+  return 0.5F * amplitude * (1 - std::cos(static_cast<float>(6.283185307 * now / period)));
+}
+
+void Tissue::breathe(float amplitude, double period) {
+  if (!(period > 0.1) || !(std::fabs(amplitude) < 100)) {
+    throw std::runtime_error("breathe: a period above 0.1 s and less than 100 mm");
+  }
+  amplitude_ = amplitude;
+  period_ = period;
+  clock_.load([amplitude, period](upt::Input &input, double moment) {
+    const float position[3] = {0, 0, up(amplitude, period, moment)}, rotation[4] = {0, 0, 0, 1};
+    if (amplitude != 0) {
+      input.support(position, rotation);
+    }
+  });
+}
+
 void Tissue::frame(double now) {
-  const upt::span<const upt_instrument> tools(&tool, in_hand ? 1 : 0);
+  height_ = solves_contact_ ? up(amplitude_, period_, now) : 0;
+  upt_instrument framed = tool; // the library has it in the organ's frame
+  framed.position[2] -= height_;
+  const upt::span<const upt_instrument> tools(&framed, in_hand ? 1 : 0);
   if (!solves_contact_) {
     follow(now, tools);
     return;

@@ -25,6 +25,11 @@ public:
   // Until the step in flight has landed: for pictures that must not depend on the machine's speed.
   void wait();
 
+  // What holds the organ goes up and down by so much (mm, z), once in `period` (s); 0: not at all.
+  void breathe(float amplitude, double period);
+  // How far up it is, mm: the displacements are in its frame.
+  float height() const { return height_; }
+
   upt_instrument tool = upt::make<upt_instrument>();
   bool in_hand = false; // whether the tool is there
 
@@ -45,6 +50,8 @@ private:
   std::vector<std::uint32_t> faces_;
   std::vector<float> rest_, displacement_;
   upt_instrument_reading reading_{};
+  float height_ = 0, amplitude_ = 0;
+  double period_ = 4;
   // For a bundle that cannot solve contact: what the tool pushes, found by geometry.
   bool solves_contact_ = true;
   std::vector<std::uint32_t> nodes_;
