@@ -12,6 +12,7 @@ mod envelope;
 mod hang_report;
 mod haptics;
 mod load_report;
+mod mobilise_report;
 mod processor_time;
 mod quantile;
 mod report;

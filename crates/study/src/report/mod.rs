@@ -29,6 +29,7 @@ use tissue::mesh::Mesh;
 use crate::cuts;
 use crate::hang_report;
 use crate::load_report;
+use crate::mobilise_report;
 use crate::shown;
 use crate::tools;
 use cache::Cache;
@@ -48,6 +49,9 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     }
     if options.cut > 0 {
         return cuts::report(options);
+    }
+    if options.mobilise {
+        return mobilise_report::report(options);
     }
     if options.hang > 0 {
         return hang_report::report(options);

@@ -71,6 +71,10 @@ pub struct Options {
     /// which runs here. --markdown replaces the part between the markers `study report --cut`.
     #[arg(long, value_name = "CASES", default_value_t = 0, hide_default_value = true, conflicts_with_all = ["trajectories", "data", "tools", "load", "hang"])]
     pub cut: usize,
+    /// Measure how a part of what holds the organ is led, let go under the gravity of --gravity and held again (*mobilise*), in the bundles of --bundle against the reference
+    /// solver, which runs here; without a tool and with a ball. --markdown replaces the part between the markers `study report --mobilise`.
+    #[arg(long, conflicts_with_all = ["trajectories", "data", "tools", "load", "hang", "cut"])]
+    pub mobilise: bool,
     /// With --hang: stiffness of the bed's ties together, N/m.
     #[arg(long, default_value_t = HangSizes::default().stiffness)]
     pub bed_stiffness: f32,
