@@ -5,8 +5,8 @@
 )]
 
 use crate::kernel::{
-    LaneTerms, Shape, add_forces, add_forces_of_stretches, add_volumes, add_volumes_of_stretches,
-    relax,
+    Eigenvalues, LaneTerms, Shape, Strain, add_forces, add_forces_of_stretches, add_volumes,
+    add_volumes_of_stretches, by_eigenvalues, relax,
 };
 use crate::laws::{Isochoric, Law};
 use crate::partition::{Chunk, Partition};
@@ -36,7 +36,7 @@ pub struct Kernels {
 
 /// Forces of all clusters of a chunk; returns the smallest det F.
 #[inline(always)]
-unsafe fn all_forces<L: NodeLanes, const AVERAGED: bool>(
+unsafe fn all_forces<L: Eigenvalues, const AVERAGED: bool>(
     partition: &Partition,
     chunk: &Chunk,
     nodes: *const [f32; 4],
@@ -79,7 +79,7 @@ unsafe fn forces_by<L: NodeLanes, M: Isochoric, const AVERAGED: bool>(
 
 /// The same by a law in principal stretches.
 #[inline(always)]
-unsafe fn forces_by_stretches<L: NodeLanes, const AVERAGED: bool>(
+unsafe fn forces_by_stretches<L: Eigenvalues, const AVERAGED: bool>(
     partition: &Partition,
     chunk: &Chunk,
     nodes: *const [f32; 4],
@@ -125,7 +125,7 @@ unsafe fn all_volumes<L: NodeLanes>(
 
 /// What the elements of a chunk remember goes on, and pushes.
 #[inline(always)]
-unsafe fn all_histories<L: NodeLanes>(
+unsafe fn all_histories<L: Eigenvalues>(
     partition: &Partition,
     chunk: &Chunk,
     step: &StressStep,
@@ -223,6 +223,19 @@ macro_rules! kernels {
                 u: *mut [f32; 4],
             ) {
                 unsafe { advance::<$lanes>(count, beta, f, d, u) }
+            }
+
+            $(#[target_feature(enable = $feature)])?
+            #[inline(never)]
+            unsafe fn deviator(law: &LaneTerms, strain: &Strain<$lanes>) -> [$lanes; 6] {
+                unsafe { by_eigenvalues(law, strain) }
+            }
+
+            impl Eigenvalues for $lanes {
+                #[inline(always)]
+                unsafe fn by_eigenvalues(law: &LaneTerms, strain: &Strain<Self>) -> [Self; 6] {
+                    unsafe { deviator(law, strain) }
+                }
             }
 
             pub const KERNELS: Kernels = Kernels {

@@ -42,7 +42,7 @@ use moduli::moduli;
 pub use relax::relax;
 pub use shape::Shape;
 use shape::{cross, dot, edges, load, shape};
-pub use stretches::LaneTerms;
+pub use stretches::{Eigenvalues, LaneTerms, Strain, by_eigenvalues};
 
 /// Floating-point operations of one cluster in `add_forces`, a fused multiply-add counted as two.
 pub fn flops(nodes: usize, tets: usize, law: &Law) -> usize {

@@ -5,7 +5,7 @@
 //! corner `k` is `-V P g_k`.
 
 use super::shape::{dot, edges, load};
-use super::stretches::{LaneTerms, Strain, deviator};
+use super::stretches::{Eigenvalues, LaneTerms, Strain, deviator};
 use crate::cluster::{Cluster, corners};
 use crate::gradients::Gradients;
 use lanes::{NodeLanes, WIDTH};
@@ -76,7 +76,7 @@ pub(super) unsafe fn of_corners<L: NodeLanes, const NODES: usize>(
 /// [`super::add_forces`].
 #[inline(always)]
 pub unsafe fn add_forces_of_stretches<
-    L: NodeLanes,
+    L: Eigenvalues,
     const NODES: usize,
     const TETS: usize,
     const AVERAGED: bool,

@@ -4,7 +4,7 @@
 
 use super::gradients::{gradient, of_corners, volume};
 use super::shape::{dot, edges, load};
-use super::stretches::{LaneTerms, Strain, deviator, product};
+use super::stretches::{Eigenvalues, LaneTerms, Strain, deviator, product};
 use crate::cluster::{Cluster, corners};
 use crate::gradients::Gradients;
 use crate::principal::PLACE;
@@ -46,7 +46,7 @@ fn ahead<T>(at: *const T, bytes: usize, lines: usize) {
 
 /// Takes the stresses at displacements (mm) into the `history` of the clusters, and adds the forces (µN) of the first `ROWS` rows of weights.
 #[inline(always)]
-pub unsafe fn relax<L: NodeLanes, const NODES: usize, const TETS: usize, const ROWS: usize>(
+pub unsafe fn relax<L: Eigenvalues, const NODES: usize, const TETS: usize, const ROWS: usize>(
     law: &LaneTerms,
     step: &StressStep,
     (clusters, gradients): (&[Cluster<NODES, TETS>], &[Gradients<TETS>]),

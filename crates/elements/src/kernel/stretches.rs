@@ -163,19 +163,27 @@ unsafe fn scalar_power<L: NodeLanes>(x: L, n: u32) -> L {
     }
 }
 
+/// Lanes that have [`by_eigenvalues`] as one function of their instruction set. Inlined into every kernel it was a third of the library.
+///
+/// # Safety
+/// As [`NodeLanes`].
+pub trait Eigenvalues: NodeLanes {
+    unsafe fn by_eigenvalues(law: &LaneTerms, strain: &Strain<Self>) -> [Self; 6];
+}
+
 /// `T`, Pa.
 #[inline(always)]
-pub unsafe fn deviator<L: NodeLanes>(law: &LaneTerms, strain: &Strain<L>) -> [L; 6] {
+pub unsafe fn deviator<L: Eigenvalues>(law: &LaneTerms, strain: &Strain<L>) -> [L; 6] {
     unsafe {
         if !law.whole {
-            return by_eigenvalues(law, strain);
+            return L::by_eigenvalues(law, strain);
         }
         let (t, largest) = by_powers(law, strain);
         let limit = L::splat(CAPPED);
         if largest.all_below(limit) {
             return t;
         }
-        let mut out = by_eigenvalues(law, strain);
+        let mut out = L::by_eigenvalues(law, strain);
         for k in 0..6 {
             out[k] = largest.below(limit, t[k], out[k]);
         }
@@ -269,7 +277,7 @@ unsafe fn difference<L: NodeLanes>(
 
 /// `T` of any exponents.
 #[inline(always)]
-unsafe fn by_eigenvalues<L: NodeLanes>(law: &LaneTerms, strain: &Strain<L>) -> [L; 6] {
+pub unsafe fn by_eigenvalues<L: NodeLanes>(law: &LaneTerms, strain: &Strain<L>) -> [L; 6] {
     unsafe {
         let zero = L::splat(0.0);
         let third = L::splat(1.0 / 3.0);
