@@ -250,10 +250,9 @@ macro_rules! kernels {
     };
 }
 
+// Eight lanes, as in the portable set: one code for both.
 #[cfg(any(not(target_family = "wasm"), feature = "scalar"))]
-kernels!(scalar, lanes::Scalar);
-#[cfg(not(any(target_arch = "aarch64", target_family = "wasm")))]
-kernels!(portable_scalar, lanes::Scalar<8>);
+kernels!(scalar, lanes::Scalar<8>);
 #[cfg(target_arch = "x86_64")]
 kernels!(portable, lanes::Portable, "avx2,fma");
 #[cfg(target_arch = "aarch64")]
@@ -279,7 +278,7 @@ impl Kernels {
             #[cfg(any(not(target_family = "wasm"), feature = "scalar"))]
             Isa::Scalar => Some(scalar::KERNELS),
             #[cfg(not(any(target_arch = "aarch64", target_family = "wasm")))]
-            Isa::PortableScalar => Some(portable_scalar::KERNELS),
+            Isa::PortableScalar => Some(scalar::KERNELS),
             #[cfg(any(
                 target_arch = "x86_64",
                 target_arch = "aarch64",
