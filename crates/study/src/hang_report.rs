@@ -3,24 +3,20 @@
 //! Both get the same ties, step by step from their own last state. The solver runs here: a case is three seconds of tissue.
 
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 use contact::Vector;
 use serde::Serialize;
 use tissue::hang::Hang;
-use tissue::mesh::{Boundary, Mesh};
 use tissue::schemes::FRAME_S;
-use tissue::solver::{Solver, SolverOptions};
-use upt::{Corrections, Loads, Model, ModelOptions, Scene, SceneOptions, StepInput};
+use tissue::solver::Solver;
+use upt::{Loads, StepInput};
 
+use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
 use crate::quantile::median;
 use crate::report::options::Options;
-use crate::table::{Column, Table};
-use upt_cli::bundle_folder::BundleFolder;
+use crate::table::Column;
 use upt_cli::effort::Effort;
-use upt_cli::marks::replace_between;
 
 /// A case of the reference solver: by frame the force of each tie (mN), the field, and when each broke.
 struct Truth {
@@ -41,9 +37,9 @@ struct Row {
     /// Of them torn at the end, all cases: by the solver, and by the library.
     torn: [usize; 2],
     /// Sums over ties, frames and cases: what forces are off by, over what they are; of ties that are whole in both.
-    force_error: f64,
+    force_error: Option<f64>,
     /// Of the thread alone.
-    thread_error: f64,
+    thread_error: Option<f64>,
     /// Cases in which the first tie to break is the same.
     same_first: usize,
     /// Ties that the library breaks in the step of the first one, mean over the cases.
@@ -58,57 +54,23 @@ struct Row {
 
 /// Measures and prints the table.
 pub fn report(asked: &Options) -> Result<ExitCode> {
-    if asked.bundles.is_empty() {
-        bail!("name the bundles to measure with --bundle");
-    }
-    let mut rows = Vec::new();
-    for path in &asked.bundles {
-        let bundle = BundleFolder::read(path)?;
-        let mesh = Mesh::read(&bundle.mesh_file)?;
-        let boundary: Boundary = bundle.boundary.parse().map_err(anyhow::Error::msg)?;
-        let options = ModelOptions::default();
-        let model = Model::open(path, &options).with_context(|| path.display().to_string())?;
-        let mut truths = Vec::new();
-        for seed in 1..=asked.hang as u64 {
-            eprintln!("{}: case {seed} of {}", bundle.name, asked.hang);
-            truths.push(truth(asked, seed, &mesh, boundary, &model)?);
-        }
-        let recommended = bundle.corrections.unwrap_or(Effort::NONE);
-        let efforts = match asked.corrections.as_slice() {
-            [] => &[recommended],
-            efforts => efforts,
+    beside::report(asked, "study report --hang", (&[0], &COLUMNS), |subject| {
+        let case = |seed| {
+            eprintln!("{}: case {seed} of {}", subject.name, asked.hang);
+            truth(asked, seed, subject)
         };
-        for effort in efforts {
-            rows.push(measure(asked, *effort, &bundle, &model, &truths)?);
-        }
-    }
-    let table = Table::of(&[0], &COLUMNS, &rows).markdown();
-    match asked.json {
-        true => println!("{}", serde_json::to_string_pretty(&rows)?),
-        false => print!("{table}"),
-    }
-    for page in &asked.markdown {
-        replace_between(page, "study report --hang", &format!("\n{table}"))?;
-    }
-    Ok(ExitCode::SUCCESS)
+        let truths: Vec<Truth> = (1..=asked.hang as u64).map(case).collect::<Result<_>>()?;
+        let efforts = subject.efforts.iter();
+        (efforts.map(|effort| measure(*effort, subject, &truths))).collect()
+    })
 }
 
-/// The reference solver's answer, with the bundle's material.
-fn truth(
-    asked: &Options,
-    seed: u64,
-    mesh: &Mesh,
-    boundary: Boundary,
-    model: &Model,
-) -> Result<Truth> {
-    let options = SolverOptions {
-        material: model.manifest.material,
-        threads: asked.most_threads() as usize,
-        ..SolverOptions::default()
-    };
+/// The reference solver's answer.
+fn truth(asked: &Options, seed: u64, subject: &Subject) -> Result<Truth> {
+    let (mesh, boundary) = (&subject.mesh, subject.boundary);
     let hang = Hang::new(mesh, boundary, seed, asked.bed_sizes())
         .context("no part of the domain has room for the bed; give a smaller radius")?;
-    let mut solver = Solver::new(mesh, boundary, options)?;
+    let mut solver = Solver::new(mesh, boundary, subject.solver())?;
     let (mut forces, mut fields, mut broke_s) = (Vec::new(), Vec::new(), Vec::new());
     for frame in 1..=(hang.duration_s() / FRAME_S).round() as usize {
         solver.set_ties(&hang.ties(frame as f64 * FRAME_S))?;
@@ -128,32 +90,12 @@ fn truth(
     })
 }
 
-fn measure(
-    asked: &Options,
-    effort: Effort,
-    bundle: &BundleFolder,
-    model: &Arc<Model>,
-    truths: &[Truth],
-) -> Result<Row> {
-    let options = SceneOptions {
-        threads: asked.most_threads() as usize,
-        corrections: match (effort.most, effort.target_mm) {
-            (0, _) => bail!("ties pull in corrections; give --corrections at least 1"),
-            (most, 0.0) => Corrections::Fixed(most),
-            (most, target_mm) => Corrections::Auto {
-                most,
-                target_mm,
-                budget_us: 0,
-            },
-        },
-        substeps: effort.substeps,
-        ..SceneOptions::default()
-    };
-    let scene = Scene::new(Arc::clone(model), &options)?;
+fn measure(effort: Effort, subject: &Subject, truths: &[Truth]) -> Result<Row> {
+    let scene = subject.scene(effort)?;
     let mut u = vec![0.0; 3 * scene.node_count()];
-    let (mut errors, mut times, mut late) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut sums, mut thread, mut torn) = ([0.0; 2], [0.0; 2], [0; 2]);
-    let (mut same_first, mut in_first_step, mut smallest_det) = (0, 0, 1.0f64);
+    let (mut errors, mut steps, mut late) = (Vec::new(), Steps::default(), Vec::new());
+    let (mut bed, mut thread, mut torn) = (Relative::default(), Relative::default(), [0; 2]);
+    let (mut same_first, mut in_first_step) = (0, 0);
     for truth in truths {
         scene.reset()?;
         let mut broke: Vec<Option<f64>> = vec![None; truth.broke_s.len()];
@@ -168,15 +110,11 @@ fn measure(
                 loads,
                 ..StepInput::default()
             };
-            let start = Instant::now();
-            scene.step(input, Some(&mut u))?;
-            times.push(1e3 * start.elapsed().as_secs_f64());
-            let det = f64::from(scene.stats().min_det);
-            smallest_det = smallest_det.min(if det == 0.0 { 1.0 } else { det });
+            steps.step(&scene, input, &mut u)?;
+            ensure!(steps.refused == 0, "the guard refused a step");
             let pairs = u.as_chunks::<3>().0.iter().zip(field);
-            let squares =
-                pairs.map(|(a, b)| (Vector::from(*a) - Vector::from(*b)).length_squared());
-            errors.push(squares.map(f64::from).sum::<f64>() / field.len() as f64);
+            let squares = pairs.map(|(own, wanted)| square(*own, *wanted));
+            errors.push(squares.sum::<f64>() / field.len() as f64);
             let last = forces.len() - 1;
             for (index, (reading, wanted)) in scene.tie_readings()?.iter().zip(forces).enumerate() {
                 if reading.broke {
@@ -186,15 +124,10 @@ fn measure(
                 if reading.broken || !is_whole {
                     continue;
                 }
-                let off = f64::from((Vector::from(reading.force) - *wanted).length());
-                let size = f64::from(wanted.length());
-                let sum = if index == last {
-                    &mut thread
-                } else {
-                    &mut sums
-                };
-                sum[0] += off;
-                sum[1] += size;
+                match index == last {
+                    true => thread.add(reading.force, *wanted),
+                    false => bed.add(reading.force, *wanted),
+                }
             }
         }
         let first = |times: &[Option<f64>]| {
@@ -221,26 +154,23 @@ fn measure(
     }
     let counts = truths.iter().map(|truth| truth.broke_s.len() as f64 - 1.0);
     Ok(Row {
-        bundle: bundle.name.clone(),
+        bundle: subject.name.clone(),
         corrections: effort.to_string(),
         cases: truths.len(),
         ties: median(counts),
         torn,
-        force_error: sums[0] / f64::max(sums[1], f64::MIN_POSITIVE),
-        thread_error: thread[0] / f64::max(thread[1], f64::MIN_POSITIVE),
+        force_error: bed.ratio(),
+        thread_error: thread.ratio(),
         same_first,
         first_step: in_first_step as f64 / truths.len() as f64,
         late: match late.is_empty() {
             true => [0.0; 2],
-            false => [
-                median(late.iter().copied()),
-                late.iter().copied().fold(0.0, f64::max),
-            ],
+            false => [median(late.iter().copied()), largest(late.iter().copied())],
         },
         mse: median(errors.iter().copied()),
-        worst_mse: errors.iter().copied().fold(0.0, f64::max),
-        smallest_det,
-        step_ms: median(times),
+        worst_mse: largest(errors.iter().copied()),
+        smallest_det: steps.smallest_det,
+        step_ms: median(steps.ms),
     })
 }
 
@@ -261,10 +191,8 @@ const COLUMNS: [Column<Row>; 13] = [
     ("late, steps (worst)", |row| {
         format!("{:.1} ({:.1})", row.late[0], row.late[1])
     }),
-    ("force error: bed", |row| {
-        format!("{:.1} %", 100.0 * row.force_error)
-    }),
-    ("thread", |row| format!("{:.1} %", 100.0 * row.thread_error)),
+    ("force error: bed", |row| percent(row.force_error)),
+    ("thread", |row| percent(row.thread_error)),
     ("MSE, mm² (median)", |row| format!("{:.2e}", row.mse)),
     ("worst", |row| format!("{:.2e}", row.worst_mse)),
     ("smallest det F", |row| format!("{:.2}", row.smallest_det)),

@@ -5,6 +5,7 @@
 //! Exit codes: 0 done; 1 the command ran and its finding is bad (`stress`); 2 wrong usage or input.
 
 mod bench;
+mod beside;
 mod compare;
 mod cuts;
 mod date;

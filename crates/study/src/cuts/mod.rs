@@ -5,27 +5,21 @@
 mod programmes;
 
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use contact::{Shape, Vector};
 use serde::Serialize;
-use tissue::mesh::{Boundary, Mesh};
 use tissue::schemes::FRAME_S;
-use tissue::solver::{Solver, SolverOptions, Tool as Rigid, ToolPose};
+use tissue::solver::{Solver, Tool as Rigid, ToolPose};
 use topology::Sweep;
-use upt::{
-    Blade, Contact, Corrections, Error, Mode, Model, ModelOptions, Scene, SceneOptions, Tool,
-};
+use upt::{Blade, Contact, Mode, Scene, Tool};
 
+use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
 use crate::quantile::{median, quantile};
 use crate::report::options::Options;
-use crate::table::{Column, Table};
-use programmes::{BALL_MM, Frame, Operation, PROGRAMMES, Site};
-use upt_cli::bundle_folder::BundleFolder;
-use upt_cli::effort::Effort;
-use upt_cli::marks::replace_between;
+use crate::table::Column;
+use programmes::{BALL_MM, Frame, Operation, PROGRAMMES, Programme, Site};
 
 /// What the blades of the programmes feel, J/m².
 const FRACTURE_ENERGY: f64 = 10.0;
@@ -46,13 +40,12 @@ struct Row {
     near_mse: f64,
     worst_mse: f64,
     /// Sums over frames and cases: what the force on the ball is off by, over what it is; the same of the blade.
-    force_error: f64,
-    blade_error: f64,
+    force_error: Option<f64>,
+    blade_error: Option<f64>,
     /// Volume that has left, of the library over the solver's.
-    removed_ratio: f64,
+    removed_ratio: Option<f64>,
     smallest_det: f64,
     fell_back: usize,
-    /// Steps that the guard refused: the last state stays.
     refused: usize,
     /// How far a node is from rest at the most, mm: by the library, and by the solver.
     farthest_mm: [f64; 2],
@@ -65,121 +58,67 @@ struct Row {
 #[derive(Default)]
 struct Found {
     errors: Vec<[f64; 2]>,
-    /// Off, and the solver's own.
-    force: [f64; 2],
-    blade: [f64; 2],
+    force: Relative,
+    blade: Relative,
     /// What new area takes, J/m².
     energy: f64,
     removed: [f64; 2],
     copies: Vec<f64>,
     changes: Vec<f64>,
-    steps: Vec<f64>,
-    smallest_det: f64,
-    fell_back: usize,
-    refused: usize,
+    steps: Steps,
     farthest_mm: [f64; 2],
 }
 
 /// Measures and prints the table.
 pub fn report(asked: &Options) -> Result<ExitCode> {
-    if asked.bundles.is_empty() {
-        bail!("name the bundles to measure with --bundle");
-    }
-    let mut rows = Vec::new();
-    for path in &asked.bundles {
-        let bundle = BundleFolder::read(path)?;
-        let mesh = Mesh::read(&bundle.mesh_file)?;
-        let boundary: Boundary = bundle.boundary.parse().map_err(anyhow::Error::msg)?;
-        let model = Model::open(path, &ModelOptions::default())
-            .with_context(|| path.display().to_string())?;
-        let recommended = bundle.corrections.unwrap_or(Effort::NONE);
-        let efforts = match asked.corrections.as_slice() {
-            [] => &[recommended],
-            efforts => efforts,
-        };
-        for effort in efforts {
-            for programme in &PROGRAMMES {
-                let mut found = Found {
-                    smallest_det: 1.0,
-                    energy: if programme.feels {
-                        FRACTURE_ENERGY
-                    } else {
-                        0.0
-                    },
-                    ..Found::default()
-                };
-                for seed in 1..=asked.cut as u64 {
-                    eprintln!(
-                        "{}: {} {seed} of {}",
-                        bundle.name, programme.name, asked.cut
-                    );
-                    let scene = Scene::new(Arc::clone(&model), &scene_options(asked, *effort)?)?;
-                    let site = Site::of(&scene, seed).context("the domain has no nodes")?;
-                    let frames = (programme.frames)(&site);
-                    case(
-                        asked,
-                        &scene,
-                        (&mesh, boundary),
-                        (&site, &frames),
-                        &mut found,
-                    )
-                    .with_context(|| format!("{} of seed {seed}", programme.name))?;
+    beside::report(
+        asked,
+        "study report --cut",
+        (&[0, 1], &COLUMNS),
+        |subject| {
+            let mut rows = Vec::new();
+            for effort in &subject.efforts {
+                for programme in &PROGRAMMES {
+                    let mut found = Found {
+                        energy: if programme.feels {
+                            FRACTURE_ENERGY
+                        } else {
+                            0.0
+                        },
+                        ..Found::default()
+                    };
+                    for seed in 1..=asked.cut as u64 {
+                        let Programme { name, .. } = programme;
+                        eprintln!("{}: {name} {seed} of {}", subject.name, asked.cut);
+                        let scene = subject.scene(*effort)?;
+                        let site = Site::of(&scene, seed).context("the domain has no nodes")?;
+                        let frames = (programme.frames)(&site);
+                        case(subject, &scene, (&site, &frames), &mut found)
+                            .with_context(|| format!("{name} of seed {seed}"))?;
+                    }
+                    rows.push(Row {
+                        bundle: subject.name.clone(),
+                        programme: programme.name,
+                        corrections: effort.to_string(),
+                        cases: asked.cut,
+                        ..found.row()
+                    });
                 }
-                let row = Row {
-                    bundle: bundle.name.clone(),
-                    programme: programme.name,
-                    corrections: effort.to_string(),
-                    cases: asked.cut,
-                    ..found.row()
-                };
-                rows.push(row);
             }
-        }
-    }
-    let table = Table::of(&[0, 1], &COLUMNS, &rows).markdown();
-    match asked.json {
-        true => println!("{}", serde_json::to_string_pretty(&rows)?),
-        false => print!("{table}"),
-    }
-    for page in &asked.markdown {
-        replace_between(page, "study report --cut", &format!("\n{table}"))?;
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-fn scene_options(asked: &Options, effort: Effort) -> Result<SceneOptions> {
-    Ok(SceneOptions {
-        threads: asked.most_threads() as usize,
-        corrections: match (effort.most, effort.target_mm) {
-            (0, _) => {
-                bail!("a scene without corrections cannot be cut; give --corrections at least 1")
-            }
-            (most, 0.0) => Corrections::Fixed(most),
-            (most, target_mm) => Corrections::Auto {
-                most,
-                target_mm,
-                budget_us: 0,
-            },
+            Ok(rows)
         },
-        substeps: effort.substeps,
-        ..SceneOptions::default()
-    })
+    )
 }
 
 /// Makes the frames of a case in both.
 fn case(
-    asked: &Options,
+    subject: &Subject,
     scene: &Scene,
-    (mesh, boundary): (&Mesh, Boundary),
     (site, frames): (&Site, &[Frame]),
     found: &mut Found,
 ) -> Result<()> {
-    let options = SolverOptions {
-        material: scene.model().manifest.material,
-        threads: asked.most_threads() as usize,
-        ..SolverOptions::default()
-    };
-    let mut truth = Solver::new(mesh, boundary, options)?;
+    let (mesh, boundary) = (&subject.mesh, subject.boundary);
+    let mut truth = Solver::new(mesh, boundary, subject.solver())?;
     let rigid = Rigid {
         shape: Shape::Sphere { radius: BALL_MM },
         friction: 0.0,
@@ -187,13 +126,12 @@ fn case(
     };
     let mut ball = ball_at(BALL_MM, site.away())?;
     truth.set_tools(mesh.samples(boundary), &[rigid], &[ball.pose])?;
-    let is_near: Vec<bool> = (mesh.positions.iter())
-        .map(|place| site.distance(*place) < NEAR_MM)
+    let near: Vec<usize> = (0..mesh.node_count())
+        .filter(|node| site.distance(mesh.positions[*node]) < NEAR_MM)
         .collect();
-    let near_count = is_near.iter().filter(|near| **near).count().max(1);
     for frame in frames {
         for operation in &frame.operations {
-            operate(scene, &mut truth, mesh, operation, found)?;
+            operate((subject, scene), &mut truth, operation, found)?;
         }
         ball.pose.translation = Vector::from(frame.ball.unwrap_or(site.away()));
         ball.mode = match frame.grasp {
@@ -208,59 +146,30 @@ fn case(
         let mut wanted = vec![[0.0; 3]; truth.node_count()];
         truth.displacement(&mut wanted);
         let mut u = vec![0.0; 3 * scene.node_count()];
-        let start = Instant::now();
         let tools = Contact::Tools(std::slice::from_ref(&ball));
-        match scene.step(tools, Some(&mut u)) {
-            Err(Error::Guard(_)) => {
-                found.refused += 1;
-                scene.read(&mut u)?;
-            }
-            other => other?,
+        found.steps.step(scene, tools.into(), &mut u)?;
+        let u = u.as_chunks::<3>().0;
+        for (most, field) in (found.farthest_mm.iter_mut()).zip([u, &wanted]) {
+            let sizes = field.iter().map(|u| Vector::from(*u).length().into());
+            *most = most.max(largest(sizes));
         }
-        found.steps.push(1e3 * start.elapsed().as_secs_f64());
-        let stats = scene.stats();
-        // 0 where nothing was corrected.
-        if stats.min_det != 0.0 {
-            found.smallest_det = found.smallest_det.min(stats.min_det.into());
-        }
-        found.fell_back += usize::from(stats.flags & upt::flag::FELL_BACK != 0);
         // The mesh's own nodes: copies are made where a corner lies in either.
-        let squares =
-            (u.as_chunks::<3>().0.iter().zip(&wanted).zip(&is_near)).map(|((a, b), near)| {
-                let square = (Vector::from(*a) - Vector::from(*b)).length_squared();
-                (f64::from(square), *near)
-            });
-        let largest = |field: &[[f32; 3]]| {
-            let sizes = field.iter().map(|u| Vector::from(*u).length());
-            f64::from(sizes.fold(0.0, f32::max))
-        };
-        for (most, field) in (found.farthest_mm.iter_mut()).zip([u.as_chunks::<3>().0, &wanted]) {
-            *most = most.max(largest(field));
-        }
-        let (mut sum, mut near_sum) = (0.0, 0.0);
-        for (square, near) in squares {
-            sum += square;
-            near_sum += if near { square } else { 0.0 };
-        }
-        found
-            .errors
-            .push([sum / is_near.len() as f64, near_sum / near_count as f64]);
+        let at = |node: usize| square(u[node], wanted[node]);
+        let all = (0..mesh.node_count()).map(at).sum::<f64>() / mesh.node_count() as f64;
+        let close = near.iter().map(|node| at(*node)).sum::<f64>() / near.len().max(1) as f64;
+        found.errors.push([all, close]);
         let own = scene.with_contact_report(|report| report.readings[0].force);
-        let wanted = Vector::from(told.tools[0].force);
-        found.force[0] += f64::from((Vector::from(own) - wanted).length());
-        found.force[1] += f64::from(wanted.length());
+        found.force.add(own, Vector::from(told.tools[0].force));
     }
-    found
-        .copies
-        .push((scene.node_count() - mesh.node_count()) as f64);
+    let copies = scene.node_count() - mesh.node_count();
+    found.copies.push(copies as f64);
     Ok(())
 }
 
 /// One operation on both bodies.
 fn operate(
-    scene: &Scene,
+    (subject, scene): (&Subject, &Scene),
     truth: &mut Solver,
-    mesh: &Mesh,
     operation: &Operation,
     found: &mut Found,
 ) -> Result<()> {
@@ -276,8 +185,7 @@ fn operate(
             start = Instant::now();
             let made = scene.cut_with(&blade, *stroke, 2, edges.as_flattened())?;
             let wanted = Vector::from(wanted.force().map(|x| -x as f32));
-            found.blade[0] += f64::from((Vector::from(made.force) - wanted).length());
-            found.blade[1] += f64::from(wanted.length());
+            found.blade.add(made.force, wanted);
         }
         Operation::Aspirate {
             at,
@@ -294,6 +202,7 @@ fn operate(
             found.removed[0] += f64::from(scene.remove(&ball, *most_mm3)?.removed_mm3);
         }
         Operation::Stiffen { at, radius, factor } => {
+            let mesh = &subject.mesh;
             let middle = |corners: &[u32]| {
                 let places = corners
                     .iter()
@@ -333,34 +242,28 @@ fn ball_at(radius: f32, at: [f32; 3]) -> Result<Tool> {
 impl Found {
     fn row(mut self) -> Row {
         let all = |which: usize| self.errors.iter().map(move |error| error[which]);
-        let ratio = |[off, own]: [f64; 2]| if own > 0.0 { off / own } else { f64::NAN };
-        self.steps.sort_by(f64::total_cmp);
+        let [removed, wanted] = self.removed;
+        self.steps.ms.sort_by(f64::total_cmp);
+        let quick = [0.5, 0.99].map(|part| quantile(&self.steps.ms, part));
         Row {
             copies: median(self.copies.iter().copied()),
             mse: median(all(0)),
             near_mse: median(all(1)),
-            worst_mse: all(0).fold(0.0, f64::max),
-            force_error: ratio(self.force),
-            blade_error: ratio(self.blade),
-            removed_ratio: ratio(self.removed),
-            smallest_det: self.smallest_det,
-            fell_back: self.fell_back,
-            refused: self.refused,
+            worst_mse: largest(all(0)),
+            force_error: self.force.ratio(),
+            blade_error: self.blade.ratio(),
+            removed_ratio: (wanted > 0.0).then(|| removed / wanted),
+            smallest_det: self.steps.smallest_det,
+            fell_back: self.steps.fell_back,
+            refused: self.steps.refused,
             farthest_mm: self.farthest_mm,
             change_ms: [
                 median(self.changes.iter().copied()),
-                self.changes.iter().copied().fold(0.0, f64::max),
+                largest(self.changes.iter().copied()),
             ],
-            step_ms: [quantile(&self.steps, 0.5), quantile(&self.steps, 0.99)],
+            step_ms: quick,
             ..Row::default()
         }
-    }
-}
-
-fn percent(part: f64) -> String {
-    match part.is_nan() {
-        true => "-".into(),
-        false => format!("{:.1} %", 100.0 * part),
     }
 }
 
