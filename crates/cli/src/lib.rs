@@ -41,6 +41,8 @@ pub mod preview;
 pub mod prior;
 pub mod progress;
 mod python;
+#[cfg(feature = "files")]
+mod regions;
 pub mod render;
 pub mod replay;
 pub mod rollout;

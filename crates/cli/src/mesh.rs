@@ -3,6 +3,8 @@
 #[cfg(feature = "files")]
 mod files;
 mod quality;
+#[cfg(feature = "files")]
+mod sets;
 
 use clap::{Args, Subcommand};
 use serde_json::json;

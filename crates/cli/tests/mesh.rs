@@ -60,12 +60,26 @@ fn import_writes_a_mesh_that_info_reads() {
         "import",
         &input,
         mesh,
-        "--fixed-sphere",
-        "0,5,2.5,6",
-        "--domain-sphere",
-        "20,5,2.5,7",
+        "--fixed",
+        "ball:0,5,2.5,6",
+        "--domain",
+        "ball:20,5,2.5,7",
+        "--window",
+        "ball:20,5,2.5,12",
     ]);
     assert!(output.status.success(), "{output:?}");
+    let made = tissue::mesh::Mesh::read(mesh.as_ref()).unwrap();
+    let at = |node: u32| made.positions[node as usize];
+    assert!(!made.fixed.is_empty() && made.fixed.iter().all(|&n| at(n)[0] <= 6.0));
+    assert!(!made.supported.is_empty() && made.supported.iter().all(|&n| at(n)[0] < 20.0));
+    let touched = |&row: &u32| made.surface[row as usize].iter().any(|&n| at(n)[0] > 13.0);
+    assert!(!made.domain.is_empty() && made.domain.iter().all(touched));
+    let nowhere = upt(&["mesh", "import", &input, mesh, "--fixed", "ball:100,0,0,1"]);
+    let said = String::from_utf8_lossy(&nowhere.stderr);
+    assert!(
+        said.contains("no node lies in the region of --fixed"),
+        "{said}"
+    );
     let info = upt(&["mesh", "info", mesh]);
     let text = String::from_utf8(info.stdout).unwrap();
     assert!(text.contains("imported from box-41-binary.msh"), "{text}");

@@ -7,12 +7,13 @@ use tissue::mesh::{Boundary, Mesh, face_area};
 use tissue::mesh_import::{
     ImportError, ImportOptions, Opened, Region, Resolution, faces_in, import, nodes_in, tets_in,
 };
-use tissue::mesh_quality::{Quality, measure};
+use tissue::mesh_quality::measure;
 
 use super::fixed;
 use super::options::Options;
 use super::stages::Stage;
 use super::unload::unload;
+use crate::regions::span;
 use crate::{foreign, preview};
 
 /// A body's longest side, mm: outside of this the unit is taken to be wrong.
@@ -151,7 +152,6 @@ fn read(options: &Options, stage: &mut Stage) -> Result<(Mesh, PathBuf)> {
             repair: !options.no_repair,
             part: options.part.clone(),
             refill: options.refill,
-            ..ImportOptions::default()
         },
     )
     .map_err(|error| {
@@ -181,11 +181,6 @@ fn hint(error: &ImportError) -> Option<&'static str> {
         }
         _ => None,
     }
-}
-
-fn span(quality: &Quality) -> String {
-    let side = |k: usize| format!("{:.1} to {:.1}", quality.low_mm[k], quality.high_mm[k]);
-    format!("x {}, y {}, z {} mm", side(0), side(1), side(2))
 }
 
 fn check_length(mesh: &Mesh, options: &Options) -> Result<()> {

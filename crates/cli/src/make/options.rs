@@ -14,8 +14,8 @@ use tissue::programmes::ToolProgramme;
 
 use crate::effort::Effort;
 use crate::loads;
-use crate::materials;
 use crate::tool_scale;
+use crate::{materials, regions};
 
 /// Until the estimated error is calibrated a bundle recommends so many, and coarse spaces are compared with so many.
 const DRAFT: u32 = 5;
@@ -217,18 +217,7 @@ impl Options {
 
     /// Millimetres a unit of the input.
     pub fn scale(&self) -> Result<f64> {
-        Ok(match self.unit.as_str() {
-            "mm" => 1.0,
-            "cm" => 10.0,
-            "m" => 1000.0,
-            "in" => 25.4,
-            other => match other.parse::<f64>() {
-                Ok(scale) if scale.is_finite() && scale > 0.0 => scale,
-                _ => bail!(
-                    "--unit is `{other}`; use mm, cm, m, in, or a number of millimetres per unit"
-                ),
-            },
-        })
+        regions::millimetres(&self.unit)
     }
 
     /// The tissue.

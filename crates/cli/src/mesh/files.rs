@@ -6,16 +6,16 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::Args;
 use serde_json::json;
-use tissue::mesh_import::{Ball, ImportOptions, RawTets, Resolution, from_tets, import};
+use tissue::mesh_import::{ImportOptions, RawTets, Region, Resolution, from_tets, import};
 use tissue::mesh_quality::measure;
 use tissue::stuffing::{GridField, HalfSpace, stuff};
 
-use super::print_quality;
-use crate::foreign;
+use super::{print_quality, sets};
+use crate::{foreign, regions};
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  upt mesh import liver.msh liver.mesh.safetensors --fixed-sphere 0,0,0,20 --domain-sphere 60,0,30,25\n  upt mesh import kidney.stl kidney.mesh.safetensors --nodes 5000 --scale 1000"
+    after_help = "Examples:\n  upt mesh import liver.msh liver.mesh.safetensors --fixed ball:0,0,0,20 --domain ball:60,0,30,25\n  upt mesh import kidney.stl kidney.mesh.safetensors --nodes 5000 --unit m"
 )]
 pub struct Import {
     /// File to read: .vtk, .vtu, .vtp, .msh (1, 2 or 4.1), .inp, .feb, .mesh, .node, .ele, .stl, .obj, .ply, .off, or a
@@ -26,9 +26,9 @@ pub struct Import {
     /// Name in the mesh file. Default: the input's.
     #[arg(long)]
     name: Option<String>,
-    /// Millimetres per unit of the file: 1000 for metres.
-    #[arg(long, default_value_t = 1.0)]
-    scale: f64,
+    /// Unit of the file's coordinates: mm, cm, m, in, or a number of millimetres per unit. Regions are in mm.
+    #[arg(long, default_value = "mm")]
+    unit: String,
     /// Surfaces: number of nodes to aim for.
     #[arg(long, conflicts_with = "spacing")]
     nodes: Option<usize>,
@@ -47,15 +47,16 @@ pub struct Import {
     /// Labels of a label volume that are the body: one or several (`--label 1,3`). Default: all but 0.
     #[arg(long, value_name = "LABELS", value_delimiter = ',')]
     label: Vec<i64>,
-    /// Hold the nodes in this ball (x,y,z,r in mm); may be repeated.
-    #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
-    fixed_sphere: Vec<Ball>,
-    /// Instruments may touch the surface in this ball; may be repeated.
-    #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
-    domain_sphere: Vec<Ball>,
-    /// Under the `supported` boundary condition hold the surface outside this ball; may be repeated.
-    #[arg(long, value_name = "X,Y,Z,R", allow_hyphen_values = true)]
-    window_sphere: Vec<Ball>,
+    /// Region whose nodes are held, in the words of `upt make`: ball:x,y,z,r, plane:a,b,c,d, inside:FILE, group:NAME, or not: before one of these.
+    /// May be repeated.
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
+    fixed: Vec<Region>,
+    /// Region of the surface that instruments may touch; may be repeated.
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
+    domain: Vec<Region>,
+    /// Under the `supported` boundary condition hold the surface outside this region; may be repeated.
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true)]
+    window: Vec<Region>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -110,24 +111,24 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
         found.push(said.to_owned())
     })?;
     let is_volume = input != args.input;
-    let imported = import(
+    let scale = regions::millimetres(&args.unit)?;
+    let mut imported = import(
         &input,
         &ImportOptions {
             name: args.name.clone().or(stem.filter(|_| is_volume)),
-            scale: args.scale,
+            scale,
             resolution,
             repair: args.repair || is_volume,
             part: args.part.clone(),
             refill: args.refill,
-            fixed: args.fixed_sphere.clone(),
-            domain: args.domain_sphere.clone(),
-            window: args.window_sphere.clone(),
         },
     )
     .map_err(|error| match error.names_file() {
         true => anyhow::Error::new(error),
         false => anyhow::Error::new(error).context(args.input.display().to_string()),
     })?;
+    let asked = [&args.fixed[..], &args.domain, &args.window];
+    sets::select(&mut imported.mesh, asked, &input, scale)?;
     imported.mesh.write(&args.output)?;
     let quality = measure(&imported.mesh);
     if args.json {
@@ -148,7 +149,7 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
     }
     print_quality(&quality);
     if imported.mesh.fixed.is_empty() {
-        println!("no node is held; name some with --fixed-sphere before simulating");
+        println!("no node is held; name some with --fixed before simulating");
     }
     println!("{:24}{}", "written", args.output.display());
     Ok(ExitCode::SUCCESS)

@@ -140,15 +140,6 @@ pub enum ImportError {
         depth_mm: f64,
         count: usize,
     },
-    #[error(
-        "the selection of `{set}` is empty: no {what} in the given balls; the mesh spans {low:?} to {high:?} mm"
-    )]
-    EmptySelection {
-        set: &'static str,
-        what: &'static str,
-        low: [f32; 3],
-        high: [f32; 3],
-    },
     #[error(transparent)]
     Mesh(#[from] MeshError),
     #[error(transparent)]

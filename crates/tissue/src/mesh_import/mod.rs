@@ -19,6 +19,7 @@
 //!
 //! REQ-090: A damaged mesh file is refused or read within bounds of memory and work.
 
+mod ball;
 mod bodies;
 mod body;
 mod choice;
@@ -38,7 +39,6 @@ mod raw;
 mod region;
 mod repair;
 mod self_crossing;
-mod sets;
 mod solid;
 mod space;
 mod surface_files;
@@ -50,12 +50,12 @@ mod vtk;
 mod walls;
 mod words;
 
+pub use ball::Ball;
 pub use distance::SurfaceDistance;
 pub use error::{ImportError, Repair};
 pub use found_body::FoundBody;
 pub use labels::{Group, Labels};
 pub use region::{Opened, Region, faces_in, nodes_in, tets_in};
-pub use sets::Ball;
 pub use tool_file::tool_shape;
 
 use body::{Body, Read};
@@ -76,7 +76,7 @@ pub struct Imported {
     pub notes: Vec<String>,
 }
 
-/// Reads `path` by its extension, checks it, fills it if it is a surface, and selects the sets.
+/// Reads `path` by its extension, checks it, and fills it if it is a surface. Its sets are empty.
 ///
 /// # Errors
 /// [`ImportError`], naming the file's element or field and what to do.
@@ -124,7 +124,6 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Imported, ImportEr
             .to_string_lossy()
             .into_owned()
     });
-    sets::select(&mut mesh, &options.fixed, &options.domain, &options.window)?;
     mesh.validate()?;
     Ok(Imported {
         mesh,

@@ -1,6 +1,5 @@
 //! What importing is asked for, and tetrahedra and surfaces as a file has them.
 
-use super::sets::Ball;
 use std::path::Path;
 
 /// How large the elements of a filled surface are.
@@ -27,13 +26,6 @@ pub struct ImportOptions {
     pub refill: bool,
     /// Which of several bodies is wanted: its number in the file's order, from 1, or its name.
     pub part: Option<String>,
-    /// Nodes in any of these balls are held: the set `fixed`.
-    pub fixed: Vec<Ball>,
-    /// Surface faces with their centroid in any of these balls may be touched: the set `domain`.
-    pub domain: Vec<Ball>,
-    /// Surface nodes outside all of these balls, and not in `fixed`, are the set `supported`;
-    /// empty: none.
-    pub window: Vec<Ball>,
 }
 
 impl Default for ImportOptions {
@@ -45,9 +37,6 @@ impl Default for ImportOptions {
             repair: false,
             refill: false,
             part: None,
-            fixed: Vec::new(),
-            domain: Vec::new(),
-            window: Vec::new(),
         }
     }
 }
