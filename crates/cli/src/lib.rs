@@ -50,6 +50,7 @@ pub mod runtime;
 pub mod setting;
 pub mod simulate;
 pub mod surrogate;
+mod three;
 pub mod tool_scale;
 #[cfg(feature = "linear")]
 pub mod validate;

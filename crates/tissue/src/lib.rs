@@ -42,3 +42,7 @@ pub mod stuffing;
 pub mod tensors;
 pub mod tool_tracks;
 pub mod trajectory;
+
+// For its feature alone: see Cargo.toml.
+#[cfg(feature = "linear")]
+use nano_gemm as _;

@@ -13,9 +13,10 @@ use serde_json::json;
 use tissue::mesh::Mesh;
 use tissue::mesh_quality::dihedral_angles;
 
+use crate::three;
+
 const PAGE: &str = include_str!("page.html");
 const SCRIPT: &str = include_str!("page.js");
-const THREE: &str = include_str!("../view/page/three.js");
 
 /// What a page shows.
 pub struct Content<'a> {
@@ -105,17 +106,20 @@ pub fn page(content: &Content<'_>) -> Result<String> {
     // A tag's end inside of the data would end the script.
     let data = data.to_string().replace("</", "<\\/");
     Ok(PAGE
-        .replace("<!-- three -->", &three()?)
+        .replace("<!-- three -->", &three_in_page()?)
         .replace("<!-- data -->", &data)
         .replace("<!-- script -->", SCRIPT))
 }
 
 /// three.js as one expression that can stand in a page: its exports as an object.
-fn three() -> Result<String> {
-    let Some((body, exports)) = THREE.rsplit_once("export{").and_then(|(body, rest)| {
-        let (list, _) = rest.split_once('}')?;
-        Some((body, list))
-    }) else {
+fn three_in_page() -> Result<String> {
+    let Some((body, exports)) = three::module()
+        .rsplit_once("export{")
+        .and_then(|(body, rest)| {
+            let (list, _) = rest.split_once('}')?;
+            Some((body, list))
+        })
+    else {
         bail!("three.js has no list of exports; write it again with vendor.sh");
     };
     let names: Vec<String> = exports

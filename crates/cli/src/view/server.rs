@@ -19,6 +19,7 @@ use super::http::{Request, answer};
 use super::protocol::{LONGEST_MESSAGE, Wish};
 use super::session::Session;
 use crate::host::{Model, ModelSettings};
+use crate::three;
 
 /// Least time between two frames: 240 a second.
 const SOONEST: Duration = Duration::from_micros(4_166);
@@ -35,7 +36,7 @@ const UNREAD: Duration = Duration::from_secs(5);
 const SPENT: f64 = 0.3;
 
 /// What the page is made of.
-const FILES: [(&str, &str, &[u8]); 11] = [
+const FILES: [(&str, &str, &[u8]); 10] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -85,11 +86,6 @@ const FILES: [(&str, &str, &[u8]); 11] = [
         "/gltf.js",
         "text/javascript",
         include_bytes!("page/gltf.js"),
-    ),
-    (
-        "/three.js",
-        "text/javascript",
-        include_bytes!("page/three.js"),
     ),
 ];
 
@@ -218,6 +214,10 @@ impl Server {
         }
         if request.path == "/socket" {
             return self.socket(stream, &request, origin.is_some());
+        }
+        if request.path == "/three.js" {
+            let module = three::module().as_bytes();
+            return answer(&mut stream, "200 OK", "text/javascript", module);
         }
         match FILES.iter().find(|(path, _, _)| *path == request.path) {
             Some((_, kind, body)) => answer(&mut stream, "200 OK", kind, body),
