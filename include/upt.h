@@ -9,448 +9,480 @@
 
 #include <stdint.h>
 
-/**
- * Success.
- */
-#define UPT_OK 0
-
-/**
- * The submitted step has not finished.
- */
-#define UPT_PENDING 1
-
-/**
- * A required pointer is NULL.
- */
-#define UPT_ERR_NULL -1
-
-/**
- * A size, index, enum or range is wrong.
- */
-#define UPT_ERR_ARGUMENT -2
-
-/**
- * This library does not know this `struct_size`.
- */
-#define UPT_ERR_STRUCT_SIZE -3
-
-/**
- * Not a live handle of this type.
- */
-#define UPT_ERR_HANDLE -4
-
-/**
- * The scene is in use by another thread or has a step in flight.
- */
-#define UPT_ERR_BUSY -5
-
-/**
- * An input holds NaN or Inf.
- */
-#define UPT_ERR_NON_FINITE -6
-
-/**
- * The call does not fit the state (for instance: wait without submit).
- */
-#define UPT_ERR_STATE -7
-
-/**
- * This build or this bundle cannot do it.
- */
-#define UPT_ERR_UNSUPPORTED -8
-
-/**
- * There is not enough memory for the call.
- */
-#define UPT_ERR_OUT_OF_MEMORY -9
-
-/**
- * ONNX Runtime is missing, too old or broken; the message lists what was tried.
- */
-#define UPT_ERR_RUNTIME -20
-
-/**
- * No provider of the list can run the model.
- */
-#define UPT_ERR_PROVIDER -21
-
-/**
- * A file cannot be read.
- */
-#define UPT_ERR_IO -30
-
-/**
- * A bundle is invalid; the message names the file and the field.
- */
-#define UPT_ERR_BUNDLE -31
-
-/**
- * The version of a bundle or snapshot is not supported.
- */
-#define UPT_ERR_VERSION -32
-
-/**
- * A snapshot is damaged or belongs to another model.
- */
-#define UPT_ERR_SNAPSHOT -33
-
-/**
- * The guard refused the new state; the last good state stays.
- */
-#define UPT_ERR_GUARD -40
-
-/**
- * A bug in the library; the scene can only be destroyed.
- */
-#define UPT_ERR_PANIC -90
-
-/**
- * ONNX Runtime's CPU provider and the native kernels.
- */
-#define UPT_PROVIDER_CPU 0
-
-/**
- * NVIDIA CUDA.
- */
-#define UPT_PROVIDER_CUDA 1
-
-/**
- * NVIDIA TensorRT.
- */
-#define UPT_PROVIDER_TENSORRT 2
-
-/**
- * NVIDIA TensorRT-RTX (a plugin provider).
- */
-#define UPT_PROVIDER_TENSORRT_RTX 3
-
-/**
- * A Universal Physics Transformer.
- */
-#define UPT_KIND_UPT 0
-
-/**
- * A linear-elastic response with a learned correction in a static basis.
- */
-#define UPT_KIND_REDUCED 1
-
-/**
- * No messages.
- */
-#define UPT_LOG_OFF 0
-
-/**
- * Failures.
- */
-#define UPT_LOG_ERROR 1
-
-/**
- * Fallbacks, and each flag once when it rises: contacts outside the envelope, states that the guard refuses.
- */
-#define UPT_LOG_WARN 2
-
-/**
- * Loading: what was opened and which provider runs it.
- */
-#define UPT_LOG_INFO 3
-
-/**
- * Stage times.
- */
-#define UPT_LOG_DEBUG 4
-
-/**
- * Everything.
- */
-#define UPT_LOG_TRACE 5
-
-/**
- * 32-bit floats: the reference. In a scene's options: the model's precision.
- */
-#define UPT_PRECISION_F32 0
-
-/**
- * bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which.
- */
-#define UPT_PRECISION_BF16 1
-
-/**
- * 16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own.
- */
-#define UPT_PRECISION_F16 2
-
-/**
- * 8-bit integers: the bundle's `*.int8.onnx`.
- */
-#define UPT_PRECISION_INT8 3
-
-/**
- * In options only: 32-bit floats, even in a scene of a model that was opened with another precision.
- */
-#define UPT_PRECISION_FORCE_F32 4
-
-/**
- * The library chooses the decoder.
- */
-#define UPT_KERNEL_AUTO 0
-
-/**
- * The fused native decoder.
- */
-#define UPT_KERNEL_NATIVE 1
-
-/**
- * ONNX Runtime sessions in node tiles.
- */
-#define UPT_KERNEL_ONNX 2
-
-/**
- * ONNX Runtime, all nodes in one run with the query table resident on the device.
- */
-#define UPT_KERNEL_RESIDENT 3
-
-/**
- * On the CPU: split. On a device: the faster of split and whole, timed while the scene is created.
- */
-#define UPT_STEP_AUTO 0
-
-/**
- * Native encoder and message mean, then `latent.onnx` and the decoder.
- */
-#define UPT_STEP_SPLIT 1
-
-/**
- * The bundle's `step.onnx`, which decodes every node in every step.
- */
-#define UPT_STEP_WHOLE 2
-
-/**
- * The faster of split and whole, timed while the scene is created.
- */
-#define UPT_STEP_MEASURED 3
+/* An enumeration of a fixed width: `enum` in C++ and C23, where debuggers name its values and compilers
+ * check them, else an integer of this name beside an `enum` of the values. */
+#if (defined(__cplusplus) && (__cplusplus >= 201103L || defined(_MSC_VER))) || (defined(__STDC_VERSION__) && __STDC_VERSION__ >= 202311L)
+#define UPT_ENUM(name, integer) \
+  enum name : integer; \
+  typedef enum name name; \
+  enum name : integer
+#else
+#define UPT_ENUM(name, integer) \
+  typedef integer name; \
+  enum name##_values
+#endif
+
+/**
+ * What a call returns: 0 is success, positive values are not errors, negative values are errors.
+ */
+UPT_ENUM(upt_status, int32_t) {
+  /**
+   * Success.
+   */
+  UPT_OK = 0,
+  /**
+   * The submitted step has not finished.
+   */
+  UPT_PENDING = 1,
+  /**
+   * A required pointer is NULL.
+   */
+  UPT_ERR_NULL = -1,
+  /**
+   * A size, index, enum or range is wrong.
+   */
+  UPT_ERR_ARGUMENT = -2,
+  /**
+   * This library does not know this `struct_size`.
+   */
+  UPT_ERR_STRUCT_SIZE = -3,
+  /**
+   * Not a live handle of this type.
+   */
+  UPT_ERR_HANDLE = -4,
+  /**
+   * The scene is in use by another thread or has a step in flight.
+   */
+  UPT_ERR_BUSY = -5,
+  /**
+   * An input holds NaN or Inf.
+   */
+  UPT_ERR_NON_FINITE = -6,
+  /**
+   * The call does not fit the state (for instance: wait without submit).
+   */
+  UPT_ERR_STATE = -7,
+  /**
+   * This build or this bundle cannot do it.
+   */
+  UPT_ERR_UNSUPPORTED = -8,
+  /**
+   * There is not enough memory for the call.
+   */
+  UPT_ERR_OUT_OF_MEMORY = -9,
+  /**
+   * ONNX Runtime is missing, too old or broken; the message lists what was tried.
+   */
+  UPT_ERR_RUNTIME = -20,
+  /**
+   * No provider of the list can run the model.
+   */
+  UPT_ERR_PROVIDER = -21,
+  /**
+   * A file cannot be read.
+   */
+  UPT_ERR_IO = -30,
+  /**
+   * A bundle is invalid; the message names the file and the field.
+   */
+  UPT_ERR_BUNDLE = -31,
+  /**
+   * The version of a bundle or snapshot is not supported.
+   */
+  UPT_ERR_VERSION = -32,
+  /**
+   * A snapshot is damaged or belongs to another model.
+   */
+  UPT_ERR_SNAPSHOT = -33,
+  /**
+   * The guard refused the new state; the last good state stays.
+   */
+  UPT_ERR_GUARD = -40,
+  /**
+   * A bug in the library; the scene can only be destroyed.
+   */
+  UPT_ERR_PANIC = -90
+};
+
+/**
+ * What runs the networks of a model.
+ */
+UPT_ENUM(upt_provider, int32_t) {
+  /**
+   * ONNX Runtime's CPU provider and the native kernels.
+   */
+  UPT_PROVIDER_CPU = 0,
+  /**
+   * NVIDIA CUDA.
+   */
+  UPT_PROVIDER_CUDA = 1,
+  /**
+   * NVIDIA TensorRT.
+   */
+  UPT_PROVIDER_TENSORRT = 2,
+  /**
+   * NVIDIA TensorRT-RTX (a plugin provider).
+   */
+  UPT_PROVIDER_TENSORRT_RTX = 3
+};
+
+/**
+ * What a model is.
+ */
+UPT_ENUM(upt_kind, int32_t) {
+  /**
+   * A Universal Physics Transformer.
+   */
+  UPT_KIND_UPT = 0,
+  /**
+   * A linear-elastic response with a learned correction in a static basis.
+   */
+  UPT_KIND_REDUCED = 1
+};
+
+/**
+ * How much the log tells.
+ */
+UPT_ENUM(upt_log_level, int32_t) {
+  /**
+   * No messages.
+   */
+  UPT_LOG_OFF = 0,
+  /**
+   * Failures.
+   */
+  UPT_LOG_ERROR = 1,
+  /**
+   * Fallbacks, and each flag once when it rises: contacts outside the envelope, states that the guard refuses.
+   */
+  UPT_LOG_WARN = 2,
+  /**
+   * Loading: what was opened and which provider runs it.
+   */
+  UPT_LOG_INFO = 3,
+  /**
+   * Stage times.
+   */
+  UPT_LOG_DEBUG = 4,
+  /**
+   * Everything.
+   */
+  UPT_LOG_TRACE = 5
+};
+
+/**
+ * Arithmetic of the heavy stages.
+ */
+UPT_ENUM(upt_precision, int32_t) {
+  /**
+   * 32-bit floats: the reference. In a scene's options: the model's precision.
+   */
+  UPT_PRECISION_F32 = 0,
+  /**
+   * bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which.
+   */
+  UPT_PRECISION_BF16 = 1,
+  /**
+   * 16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own.
+   */
+  UPT_PRECISION_F16 = 2,
+  /**
+   * 8-bit integers: the bundle's `*.int8.onnx`.
+   */
+  UPT_PRECISION_INT8 = 3,
+  /**
+   * In options only: 32-bit floats, even in a scene of a model that was opened with another precision.
+   */
+  UPT_PRECISION_FORCE_F32 = 4
+};
+
+/**
+ * What decodes.
+ */
+UPT_ENUM(upt_kernel, int32_t) {
+  /**
+   * The library chooses the decoder.
+   */
+  UPT_KERNEL_AUTO = 0,
+  /**
+   * The fused native decoder.
+   */
+  UPT_KERNEL_NATIVE = 1,
+  /**
+   * ONNX Runtime sessions in node tiles.
+   */
+  UPT_KERNEL_ONNX = 2,
+  /**
+   * ONNX Runtime, all nodes in one run with the query table resident on the device.
+   */
+  UPT_KERNEL_RESIDENT = 3
+};
+
+/**
+ * Who makes a step of a `UPT_KIND_UPT` bundle.
+ */
+UPT_ENUM(upt_step_path, int32_t) {
+  /**
+   * On the CPU: split. On a device: the faster of split and whole, timed while the scene is created.
+   */
+  UPT_STEP_AUTO = 0,
+  /**
+   * Native encoder and message mean, then `latent.onnx` and the decoder.
+   */
+  UPT_STEP_SPLIT = 1,
+  /**
+   * The bundle's `step.onnx`, which decodes every node in every step.
+   */
+  UPT_STEP_WHOLE = 2,
+  /**
+   * The faster of split and whole, timed while the scene is created.
+   */
+  UPT_STEP_MEASURED = 3
+};
+
+/**
+ * How many corrections a step gets.
+ */
+UPT_ENUM(upt_corrections_mode, int32_t) {
+  /**
+   * As many as the bundle recommends, until its own target is reached.
+   */
+  UPT_CORRECTIONS_RECOMMENDED = 0,
+  /**
+   * None.
+   */
+  UPT_CORRECTIONS_NONE = 1,
+  /**
+   * `count` of them; with a target or a budget at most so many.
+   */
+  UPT_CORRECTIONS_COUNT = 2,
+  /**
+   * As many as the target needs and the budget allows, up to 64.
+   */
+  UPT_CORRECTIONS_AUTO = 3
+};
+
+/**
+ * A switch, for what is usually on.
+ */
+UPT_ENUM(upt_switch, uint8_t) {
+  /**
+   * A switch: as usual, which its field says.
+   */
+  UPT_SWITCH_DEFAULT = 0,
+  /**
+   * A switch: on.
+   */
+  UPT_SWITCH_ON = 1,
+  /**
+   * A switch: off.
+   */
+  UPT_SWITCH_OFF = 2
+};
+
+/**
+ * What happens to a state that the guard refuses.
+ */
+UPT_ENUM(upt_guard_policy, int32_t) {
+  /**
+   * Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
+   * under `UPT_GUARD_BLEND`.
+   */
+  UPT_GUARD_HOLD = 0,
+  /**
+   * Publish finite states and set flags.
+   */
+  UPT_GUARD_REPORT = 1,
+  /**
+   * Replace a refused state by the prior's or by rest, and set flags.
+   */
+  UPT_GUARD_BLEND = 2
+};
+
+/**
+ * Bits of `flags`.
+ */
+UPT_ENUM(upt_flag, uint32_t) {
+  /**
+   * A push is longer than the model was trained on.
+   */
+  UPT_FLAG_PUSH = 1,
+  /**
+   * A contact area is outside the trained range.
+   */
+  UPT_FLAG_CONTACT_AREA = 2,
+  /**
+   * A contact lies outside the domain.
+   */
+  UPT_FLAG_SITE = 4,
+  /**
+   * A push changes faster than trained.
+   */
+  UPT_FLAG_RATE = 8,
+  /**
+   * More separate contact sites than trained.
+   */
+  UPT_FLAG_SITES = 16,
+  /**
+   * Guard: a displacement passes the bound.
+   */
+  UPT_FLAG_BOUND = 32,
+  /**
+   * Guard: the state is not finite.
+   */
+  UPT_FLAG_NON_FINITE = 64,
+  /**
+   * An element at the contact is inverted; with `check_inversion` any element, and the guard refuses the state.
+   */
+  UPT_FLAG_INVERTED = 128,
+  /**
+   * Guard: the displacement grew too much in one step.
+   */
+  UPT_FLAG_GROWTH = 256,
+  /**
+   * The learned correction was bounded.
+   */
+  UPT_FLAG_CLAMPED = 512,
+  /**
+   * The contact block was nearly singular and was regularised.
+   */
+  UPT_FLAG_REGULARISED = 1024,
+  /**
+   * The corrections ended with inverted elements, or had lost the contact of an instrument: the step's first guess or the linear response
+   * took their place.
+   */
+  UPT_FLAG_FELL_BACK = 2048,
+  /**
+   * The estimated error is above the scene's `error_limit_mm`.
+   */
+  UPT_FLAG_ERROR = 4096,
+  /**
+   * Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.
+   */
+  UPT_FLAG_DEEP = 8192,
+  /**
+   * The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings).
+   */
+  UPT_FLAG_UNSOLVED = 16384,
+  /**
+   * The bundle's tissue relaxes, and this scene makes no corrections, which alone know of it: what it shows and feels is elastic.
+   */
+  UPT_FLAG_ELASTIC = 32768
+};
+
+/**
+ * A static set of indices of a mesh.
+ */
+UPT_ENUM(upt_index_set, int32_t) {
+  /**
+   * Nodes of the surface.
+   */
+  UPT_SET_SURFACE_NODES = 0,
+  /**
+   * Nodes that instruments may touch.
+   */
+  UPT_SET_DOMAIN_NODES = 1,
+  /**
+   * Nodes held at zero under the bundle's boundary condition.
+   */
+  UPT_SET_FIXED_NODES = 2,
+  /**
+   * Surface triangles, 3 node indices each, outward.
+   */
+  UPT_SET_SURFACE_FACES = 3,
+  /**
+   * Triangles that instruments may touch, 3 node indices each, outward.
+   */
+  UPT_SET_DOMAIN_FACES = 4,
+  /**
+   * Tetrahedra, 4 node indices each, positive volume.
+   */
+  UPT_SET_TETS = 5
+};
+
+/**
+ * What is shown of a state.
+ */
+UPT_ENUM(upt_view_kind, int32_t) {
+  /**
+   * The region's nodes in its order; all nodes where there is no region.
+   */
+  UPT_VIEW_REGION = 0,
+  /**
+   * The attached points.
+   */
+  UPT_VIEW_POINTS = 1,
+  /**
+   * The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.
+   */
+  UPT_VIEW_SURFACE = 2
+};
+
+/**
+ * Shape of an instrument.
+ */
+UPT_ENUM(upt_shape, int32_t) {
+  /**
+   * An instrument's shape: a capsule along local y.
+   */
+  UPT_SHAPE_CAPSULE = 0,
+  /**
+   * An instrument's shape: a box.
+   */
+  UPT_SHAPE_BOX = 1,
+  /**
+   * An instrument's shape: a box with rounded corners.
+   */
+  UPT_SHAPE_SPATULA = 2,
+  /**
+   * An instrument's shape: a hull from `upt_hull_create`.
+   */
+  UPT_SHAPE_HULL = 3,
+  /**
+   * An instrument's shape: a ball of `radius`.
+   */
+  UPT_SHAPE_SPHERE = 4
+};
+
+/**
+ * What an instrument does to the tissue.
+ */
+UPT_ENUM(upt_mode, uint8_t) {
+  /**
+   * An instrument pushes, with Coulomb friction.
+   */
+  UPT_MODE_SLIDE = 0,
+  /**
+   * An instrument grasps what lies within 0.5 mm of it when the mode changes to this, and holds it until the mode changes back
+   * or the grasp tears off.
+   */
+  UPT_MODE_GRASP = 1
+};
+
+/**
+ * What a tie is tied to.
+ */
+UPT_ENUM(upt_end, int32_t) {
+  /**
+   * A tie's far end is in the mesh's frame, which goes with the support.
+   */
+  UPT_END_SUPPORT = 0,
+  /**
+   * A tie's far end is in the world, which is the mesh's frame where no support moves.
+   */
+  UPT_END_WORLD = 1,
+  /**
+   * A tie's far end is on an instrument.
+   */
+  UPT_END_INSTRUMENT = 2,
+  /**
+   * A tie's far end is another point of the tissue: a suture.
+   */
+  UPT_END_TISSUE = 3
+};
+
+#undef UPT_ENUM
 
-/**
- * No corrections.
- */
-#define UPT_CORRECTIONS_NONE -1
-
-/**
- * As many corrections as the scene's target needs and its budget allows.
- */
-#define UPT_CORRECTIONS_AUTO -2
-
-/**
- * A switch: as usual, which its field says.
- */
-#define UPT_SWITCH_DEFAULT 0
-
-/**
- * A switch: on.
- */
-#define UPT_SWITCH_ON 1
-
-/**
- * A switch: off.
- */
-#define UPT_SWITCH_OFF 2
-
-/**
- * Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
- * under `UPT_GUARD_BLEND`.
- */
-#define UPT_GUARD_HOLD 0
-
-/**
- * Publish finite states and set flags.
- */
-#define UPT_GUARD_REPORT 1
-
-/**
- * Replace a refused state by the prior's or by rest, and set flags.
- */
-#define UPT_GUARD_BLEND 2
-
-/**
- * A push is longer than the model was trained on.
- */
-#define UPT_FLAG_PUSH 1
-
-/**
- * A contact area is outside the trained range.
- */
-#define UPT_FLAG_CONTACT_AREA 2
-
-/**
- * A contact lies outside the domain.
- */
-#define UPT_FLAG_SITE 4
-
-/**
- * A push changes faster than trained.
- */
-#define UPT_FLAG_RATE 8
-
-/**
- * More separate contact sites than trained.
- */
-#define UPT_FLAG_SITES 16
-
-/**
- * Guard: a displacement passes the bound.
- */
-#define UPT_FLAG_BOUND 32
-
-/**
- * Guard: the state is not finite.
- */
-#define UPT_FLAG_NON_FINITE 64
-
-/**
- * An element at the contact is inverted; with `check_inversion` any element, and the guard refuses the state.
- */
-#define UPT_FLAG_INVERTED 128
-
-/**
- * Guard: the displacement grew too much in one step.
- */
-#define UPT_FLAG_GROWTH 256
-
-/**
- * The learned correction was bounded.
- */
-#define UPT_FLAG_CLAMPED 512
-
-/**
- * The contact block was nearly singular and was regularised.
- */
-#define UPT_FLAG_REGULARISED 1024
-
-/**
- * The corrections ended with inverted elements, or had lost the contact of an instrument: the step's first guess or the linear response
- * took their place.
- */
-#define UPT_FLAG_FELL_BACK 2048
-
-/**
- * The estimated error is above the scene's `error_limit_mm`.
- */
-#define UPT_FLAG_ERROR 4096
-
-/**
- * Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.
- */
-#define UPT_FLAG_DEEP 8192
-
-/**
- * The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings).
- */
-#define UPT_FLAG_UNSOLVED 16384
-
-/**
- * The bundle's tissue relaxes, and this scene makes no corrections, which alone know of it: what it shows and feels is elastic.
- */
-#define UPT_FLAG_ELASTIC 32768
-
-/**
- * Nodes of the surface.
- */
-#define UPT_SET_SURFACE_NODES 0
-
-/**
- * Nodes that instruments may touch.
- */
-#define UPT_SET_DOMAIN_NODES 1
-
-/**
- * Nodes held at zero under the bundle's boundary condition.
- */
-#define UPT_SET_FIXED_NODES 2
-
-/**
- * Surface triangles, 3 node indices each, outward.
- */
-#define UPT_SET_SURFACE_FACES 3
-
-/**
- * Triangles that instruments may touch, 3 node indices each, outward.
- */
-#define UPT_SET_DOMAIN_FACES 4
-
-/**
- * Tetrahedra, 4 node indices each, positive volume.
- */
-#define UPT_SET_TETS 5
-
-/**
- * The region's nodes in its order; all nodes where there is no region.
- */
-#define UPT_VIEW_REGION 0
-
-/**
- * The attached points.
- */
-#define UPT_VIEW_POINTS 1
-
-/**
- * The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.
- */
-#define UPT_VIEW_SURFACE 2
-
-/**
- * An instrument's shape: a capsule along local y.
- */
-#define UPT_SHAPE_CAPSULE 0
-
-/**
- * An instrument's shape: a box.
- */
-#define UPT_SHAPE_BOX 1
-
-/**
- * An instrument's shape: a box with rounded corners.
- */
-#define UPT_SHAPE_SPATULA 2
-
-/**
- * An instrument's shape: a hull from `upt_hull_create`.
- */
-#define UPT_SHAPE_HULL 3
-
-/**
- * An instrument's shape: a ball of `radius`.
- */
-#define UPT_SHAPE_SPHERE 4
-
-/**
- * An instrument pushes, with Coulomb friction.
- */
-#define UPT_MODE_SLIDE 0
-
-/**
- * An instrument grasps what lies within 0.5 mm of it when the mode changes to this, and holds it until the mode changes back
- * or the grasp tears off.
- */
-#define UPT_MODE_GRASP 1
-
-/**
- * A tie's far end is in the mesh's frame, which goes with the support.
- */
-#define UPT_END_SUPPORT 0
-
-/**
- * A tie's far end is in the world, which is the mesh's frame where no support moves.
- */
-#define UPT_END_WORLD 1
-
-/**
- * A tie's far end is on an instrument.
- */
-#define UPT_END_INSTRUMENT 2
-
-/**
- * A tie's far end is another point of the tissue: a suture.
- */
-#define UPT_END_TISSUE 3
 
 /**
  * Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.
@@ -479,11 +511,6 @@ typedef struct upt_model upt_model;
 typedef struct upt_scene upt_scene;
 
 /**
- * What a call returns: 0 is success, positive values are not errors, negative values are errors.
- */
-typedef int32_t upt_status;
-
-/**
  * Options of `upt_init`.
  */
 typedef struct upt_init_options {
@@ -505,12 +532,12 @@ typedef struct upt_init_options {
  * Receives log messages (UTF-8, valid during the call) on the host's threads, during their calls. It must not call
  * the library: such a call returns `UPT_ERR_STATE`.
  */
-typedef void (*upt_log_fn)(int32_t level,
+typedef void (*upt_log_fn)(upt_log_level level,
                            const char *message,
                            void *user);
 
 /**
- * Options of `upt_model_open`.
+ * Options of `upt_model_create`.
  */
 typedef struct upt_model_options {
   /**
@@ -524,7 +551,7 @@ typedef struct upt_model_options {
   /**
    * `UPT_PROVIDER_*` in order of preference; NULL: CPU.
    */
-  const int32_t *providers;
+  const upt_provider *providers;
   /**
    * Entries in `providers`.
    */
@@ -536,7 +563,7 @@ typedef struct upt_model_options {
   /**
    * `UPT_PRECISION_*`.
    */
-  int32_t precision;
+  upt_precision precision;
   /**
    * Bytes; 0: no limit. Needs a GPU provider in `providers`.
    */
@@ -556,7 +583,7 @@ typedef struct upt_model_options {
   /**
    * `UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`.
    */
-  uint8_t fallback;
+  upt_switch fallback;
   /**
    * 1: the same bits on every processor, for replays and lockstep; steps take longer. Reduced bundles without a network.
    */
@@ -568,7 +595,7 @@ typedef struct upt_model_options {
 } upt_model_options;
 
 /**
- * What a model is; filled by `upt_model_get_info`.
+ * What a model is; filled by `upt_model_read_info`.
  */
 typedef struct upt_model_info {
   /**
@@ -578,7 +605,7 @@ typedef struct upt_model_info {
   /**
    * `UPT_KIND_*`.
    */
-  int32_t kind;
+  upt_kind kind;
   /**
    * K, the nodes of the bundle's mesh.
    */
@@ -614,17 +641,17 @@ typedef struct upt_model_info {
   /**
    * `UPT_PROVIDER_*` that runs the latent stage.
    */
-  int32_t provider;
+  upt_provider provider;
   /**
    * `UPT_PRECISION_*`.
    */
-  int32_t precision;
+  upt_precision precision;
   /**
    * Host memory of the model.
    */
   uint64_t memory_bytes;
   /**
-   * Wall time of `upt_model_open`.
+   * Wall time of `upt_model_create`.
    */
   double load_seconds;
   /**
@@ -633,6 +660,28 @@ typedef struct upt_model_info {
    */
   double frame_step_s;
 } upt_model_info;
+
+/**
+ * How many corrections by the elements a step gets while there is contact, in `upt_scene_options`.
+ */
+typedef struct upt_corrections {
+  /**
+   * `UPT_CORRECTIONS_*`.
+   */
+  upt_corrections_mode mode;
+  /**
+   * With `UPT_CORRECTIONS_COUNT` 1 to 64; otherwise 0.
+   */
+  uint32_t count;
+  /**
+   * No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
+   */
+  uint32_t budget_us;
+  /**
+   * Corrections stop once the estimated error is below this, mm; 0: no target. Only with `UPT_CORRECTIONS_COUNT` and `UPT_CORRECTIONS_AUTO`.
+   */
+  float target_mm;
+} upt_corrections;
 
 /**
  * Options of `upt_scene_create`.
@@ -649,27 +698,27 @@ typedef struct upt_scene_options {
   /**
    * `UPT_KERNEL_*`: who decodes.
    */
-  int32_t kernel;
+  upt_kernel kernel;
   /**
    * `UPT_PRECISION_*` of the native decoder; 0: the model's; `UPT_PRECISION_FORCE_F32`: float32, whatever the model's is.
    */
-  int32_t precision;
+  upt_precision precision;
   /**
    * `UPT_GUARD_*`.
    */
-  int32_t guard_policy;
+  upt_guard_policy guard_policy;
   /**
    * A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's.
    */
   const char *mesh_path;
   /**
-   * 1: do not enforce held and contact nodes.
+   * `UPT_SWITCH_*`: held nodes and nodes in contact are where they belong, usually on; off: where the networks put them.
    */
-  uint8_t free_boundary;
+  upt_switch boundary;
   /**
    * `UPT_SWITCH_*`: tissue at rest sleeps, usually on.
    */
-  uint8_t sleep;
+  upt_switch sleep;
   /**
    * 1: the guard looks for inverted elements in each step.
    */
@@ -698,20 +747,11 @@ typedef struct upt_scene_options {
   /**
    * `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
    */
-  int32_t step_path;
+  upt_step_path step_path;
   /**
-   * Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-   * `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets.
+   * Corrections by the elements while there is contact; all zero: as many as the bundle recommends.
    */
-  int32_t corrections;
-  /**
-   * No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
-   */
-  uint32_t corrections_budget_us;
-  /**
-   * Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.
-   */
-  float corrections_target_mm;
+  struct upt_corrections corrections;
   /**
    * `UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never.
    */
@@ -739,7 +779,7 @@ typedef struct upt_instrument {
   /**
    * `UPT_SHAPE_*`.
    */
-  int32_t shape;
+  upt_shape shape;
   /**
    * Centre, mm, in the mesh's frame.
    */
@@ -763,7 +803,7 @@ typedef struct upt_instrument {
   /**
    * Only for `upt_input`: `UPT_MODE_*`.
    */
-  uint8_t mode;
+  upt_mode mode;
   /**
    * Zero.
    */
@@ -815,7 +855,7 @@ typedef struct upt_tie {
   /**
    * What it is tied to: `UPT_END_*`.
    */
-  int32_t to;
+  upt_end to;
   /**
    * The point of the tissue: nodes, of which one at least is free and near the domain, ...
    */
@@ -868,7 +908,7 @@ typedef struct upt_tie {
 } upt_tie;
 
 /**
- * What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_support` names the groups.
+ * What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_read_support` names the groups.
  */
 typedef struct upt_support {
   /**
@@ -1011,7 +1051,7 @@ typedef struct upt_input {
 } upt_input;
 
 /**
- * What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.
+ * What the tissue does to an instrument at the end of a step; filled by `upt_scene_read_instruments`.
  */
 typedef struct upt_instrument_reading {
   /**
@@ -1049,7 +1089,7 @@ typedef struct upt_instrument_reading {
 } upt_instrument_reading;
 
 /**
- * A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.
+ * A point of the surface that pushes or holds an instrument; filled by `upt_scene_read_instrument_contacts`.
  */
 typedef struct upt_instrument_contact {
   /**
@@ -1067,7 +1107,7 @@ typedef struct upt_instrument_contact {
 } upt_instrument_contact;
 
 /**
- * What a tie does at the end of a step; filled by `upt_scene_tie_readings`.
+ * What a tie does at the end of a step; filled by `upt_scene_read_ties`.
  */
 typedef struct upt_tie_reading {
   /**
@@ -1260,7 +1300,7 @@ typedef struct upt_view {
   /**
    * `UPT_VIEW_*`.
    */
-  int32_t kind;
+  upt_view_kind kind;
 } upt_view;
 
 /**
@@ -1298,7 +1338,7 @@ typedef struct upt_haptics_options {
   /**
    * `UPT_SWITCH_*`: passivity observer and controller, usually on.
    */
-  uint8_t passivity;
+  upt_switch passivity;
   /**
    * Zero.
    */
@@ -1402,7 +1442,7 @@ typedef struct upt_haptic_force {
 } upt_haptic_force;
 
 /**
- * What the last step did and cost; filled by `upt_scene_get_stats`.
+ * What the last step did; filled by `upt_scene_read_stats`.
  */
 typedef struct upt_scene_stats {
   /**
@@ -1412,9 +1452,107 @@ typedef struct upt_scene_stats {
   /**
    * `UPT_FLAG_*` of the last step.
    */
-  uint32_t flags;
+  upt_flag flags;
   /**
    * Steps since creation or reset.
+   */
+  uint64_t step_count;
+  /**
+   * Nodes decoded in the last step.
+   */
+  uint64_t decoded_node_count;
+  /**
+   * Contact nodes of the last step.
+   */
+  uint64_t contact_count;
+  /**
+   * Bytes that the scene has allocated in addition to the model; pages that it has never touched are not resident.
+   */
+  uint64_t memory_bytes;
+  /**
+   * Threads of a step.
+   */
+  uint32_t threads;
+  /**
+   * `UPT_KERNEL_*` that decodes.
+   */
+  upt_kernel kernel;
+  /**
+   * `UPT_PROVIDER_*` that runs the latent stage.
+   */
+  upt_provider provider;
+  /**
+   * `UPT_PRECISION_*` of the decoder.
+   */
+  upt_precision precision;
+  /**
+   * Largest displacement among the decoded nodes, mm.
+   */
+  float max_displacement_mm;
+  /**
+   * Largest ratio of push, rate of push, contact area and number of sites to what the model was trained on; above 1: outside.
+   */
+  float indicator;
+  /**
+   * 1: the scene sleeps.
+   */
+  uint8_t sleeping;
+  /**
+   * 1: a bug was caught in an earlier call; only destroy is left.
+   */
+  uint8_t poisoned;
+  /**
+   * 1: `upt_scene_read_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.
+   */
+  uint8_t prior_forces;
+  /**
+   * Substeps of the last step; 0 if it was not split.
+   */
+  uint8_t substeps;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[4];
+  /**
+   * `UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.
+   */
+  upt_step_path step_path;
+  /**
+   * Corrections made in the last step.
+   */
+  uint32_t corrections;
+  /**
+   * Evaluations of the element forces in the last step.
+   */
+  uint32_t evaluations;
+  /**
+   * Residual force after the corrections divided by that before them; 0 without corrections.
+   */
+  float residual;
+  /**
+   * Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
+   */
+  float error_mm;
+  /**
+   * Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither.
+   */
+  float min_det;
+} upt_scene_stats;
+
+/**
+ * What the last step took, in milliseconds; filled by `upt_scene_read_timing`.
+ */
+typedef struct upt_scene_timing {
+  /**
+   * `sizeof(upt_scene_timing)`, set by the caller.
+   */
+  uint32_t struct_size;
+  /**
+   * Zero.
+   */
+  uint8_t reserved[4];
+  /**
+   * Steps since creation or reset, the last of which this is of: as in `upt_scene_stats`.
    */
   uint64_t step_count;
   /**
@@ -1450,61 +1588,13 @@ typedef struct upt_scene_stats {
    */
   double guard_ms;
   /**
-   * Nodes decoded in the last step.
+   * Corrections, ms.
    */
-  uint64_t decoded_node_count;
+  double corrections_ms;
   /**
-   * Contact nodes of the last step.
+   * Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections.
    */
-  uint64_t contact_count;
-  /**
-   * Bytes that the scene has allocated in addition to the model; pages that it has never touched are not resident.
-   */
-  uint64_t memory_bytes;
-  /**
-   * Threads of a step.
-   */
-  uint32_t threads;
-  /**
-   * `UPT_KERNEL_*` that decodes.
-   */
-  int32_t kernel;
-  /**
-   * `UPT_PROVIDER_*` that runs the latent stage.
-   */
-  int32_t provider;
-  /**
-   * `UPT_PRECISION_*` of the decoder.
-   */
-  int32_t precision;
-  /**
-   * Largest displacement among the decoded nodes, mm.
-   */
-  float max_displacement_mm;
-  /**
-   * Largest ratio of push, rate of push, contact area and number of sites to what the model was trained on; above 1: outside.
-   */
-  float indicator;
-  /**
-   * 1: the scene sleeps.
-   */
-  uint8_t sleeping;
-  /**
-   * 1: a bug was caught in an earlier call; only destroy is left.
-   */
-  uint8_t poisoned;
-  /**
-   * 1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.
-   */
-  uint8_t prior_forces;
-  /**
-   * Substeps of the last step; 0 if it was not split.
-   */
-  uint8_t substeps;
-  /**
-   * Zero.
-   */
-  uint8_t reserved[4];
+  double contact_ms;
   /**
    * Part of the stages' times: copies to a device, ms; 0 on the CPU.
    */
@@ -1513,39 +1603,7 @@ typedef struct upt_scene_stats {
    * Part of the stages' times: copies back from a device, ms; 0 on the CPU.
    */
   double download_ms;
-  /**
-   * `UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.
-   */
-  int32_t step_path;
-  /**
-   * Corrections made in the last step.
-   */
-  uint32_t corrections;
-  /**
-   * Corrections, ms.
-   */
-  double corrections_ms;
-  /**
-   * Evaluations of the element forces in the last step.
-   */
-  uint32_t evaluations;
-  /**
-   * Residual force after the corrections divided by that before them; 0 without corrections.
-   */
-  float residual;
-  /**
-   * Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
-   */
-  float error_mm;
-  /**
-   * Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither.
-   */
-  float min_det;
-  /**
-   * Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections.
-   */
-  double contact_ms;
-} upt_scene_stats;
+} upt_scene_timing;
 
 #ifdef __cplusplus
 extern "C" {
@@ -1611,7 +1669,7 @@ const char *upt_status_name(upt_status status);
  */
 upt_status upt_set_log(upt_log_fn callback,
                        void *user,
-                       int32_t level);
+                       upt_log_level level);
 
 /**
  * Lists the providers as JSON: `[{"name":"cpu","available":true,"reason":""}]`. Loads ONNX Runtime.
@@ -1638,9 +1696,9 @@ upt_status upt_providers(char *out,
  * Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
  * `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
  */
-upt_status upt_model_open(const char *path,
-                          const struct upt_model_options *options,
-                          struct upt_model **out);
+upt_status upt_model_create(const char *path,
+                            const struct upt_model_options *options,
+                            struct upt_model **out);
 
 /**
  * Closes a model. Its scenes keep what they need and stay usable.
@@ -1648,7 +1706,7 @@ upt_status upt_model_open(const char *path,
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was closed before).
  */
-upt_status upt_model_close(struct upt_model *model);
+upt_status upt_model_destroy(struct upt_model *model);
 
 /**
  * Describes a model in numbers. Set `out->struct_size` first.
@@ -1656,8 +1714,8 @@ upt_status upt_model_close(struct upt_model *model);
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
  */
-upt_status upt_model_get_info(const struct upt_model *model,
-                              struct upt_model_info *out);
+upt_status upt_model_read_info(const struct upt_model *model,
+                               struct upt_model_info *out);
 
 /**
  * Describes a model as JSON: name, bundle hash, the provider of each stage and why the others were not chosen.
@@ -1682,9 +1740,9 @@ upt_status upt_model_describe(const struct upt_model *model,
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
  */
-upt_status upt_model_positions(const struct upt_model *model,
-                               float *out,
-                               uint64_t count);
+upt_status upt_model_read_positions(const struct upt_model *model,
+                                    float *out,
+                                    uint64_t count);
 
 /**
  * Copies a static index set.
@@ -1697,11 +1755,11 @@ upt_status upt_model_positions(const struct upt_model *model,
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
  */
-upt_status upt_model_indices(const struct upt_model *model,
-                             int32_t set,
-                             uint32_t *out,
-                             uint64_t capacity,
-                             uint64_t *needed);
+upt_status upt_model_read_indices(const struct upt_model *model,
+                                  upt_index_set set,
+                                  uint32_t *out,
+                                  uint64_t capacity,
+                                  uint64_t *needed);
 
 /**
  * Names a support group of a bundle, and copies its nodes: what `upt_input.supports` moves.
@@ -1715,13 +1773,13 @@ upt_status upt_model_indices(const struct upt_model *model,
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such group, a capacity too small).
  */
-upt_status upt_model_support(const struct upt_model *model,
-                             uint32_t group,
-                             char *name,
-                             uint64_t name_capacity,
-                             uint32_t *nodes,
-                             uint64_t node_capacity,
-                             uint64_t *needed);
+upt_status upt_model_read_support(const struct upt_model *model,
+                                  uint32_t group,
+                                  char *name,
+                                  uint64_t name_capacity,
+                                  uint32_t *nodes,
+                                  uint64_t node_capacity,
+                                  uint64_t *needed);
 
 /**
  * Names a region of the surface that the bundle names, and copies its nodes: what `upt_pressure.nodes` takes.
@@ -1735,13 +1793,13 @@ upt_status upt_model_support(const struct upt_model *model,
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such region, a capacity too small).
  */
-upt_status upt_model_region(const struct upt_model *model,
-                            uint32_t region,
-                            char *name,
-                            uint64_t name_capacity,
-                            uint32_t *nodes,
-                            uint64_t node_capacity,
-                            uint64_t *needed);
+upt_status upt_model_read_region(const struct upt_model *model,
+                                 uint32_t region,
+                                 char *name,
+                                 uint64_t name_capacity,
+                                 uint32_t *nodes,
+                                 uint64_t node_capacity,
+                                 uint64_t *needed);
 
 /**
  * Creates a scene at rest.
@@ -1759,7 +1817,7 @@ upt_status upt_scene_create(const struct upt_model *model,
 
 /**
  * Destroys a scene, after waiting for a step in flight. A poisoned scene accepts only this call and
- * `upt_scene_get_stats`.
+ * `upt_scene_read_stats`.
  *
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
@@ -1781,11 +1839,11 @@ upt_status upt_scene_reset(struct upt_scene *scene);
  * Instruments are where they will be at the end of the step: each moves there on a straight line from its last pose, and their contact is
  * solved. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with
  * Coulomb friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
- * correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene remembers
+ * correction, as a load; with `UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene remembers
  * each place of the array: pass every instrument every time, in the same order.
  *
  * - `input`: what drives the step; NULL: nothing does, the tissue moves on by itself.
- * - `out`: `[n,3]`, mm (n: K, or the region's count; K of a cut body counts the copies of its nodes, `upt_scene_node_count`), may be NULL;
+ * - `out`: `[n,3]`, mm (n: K, or the region's count; K of a cut body counts the copies of its nodes, `upt_scene_read_node_count`), may be NULL;
  *   it may be the memory of an input, at the cost of a copy.
  * - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
  *
@@ -1969,9 +2027,9 @@ upt_status upt_scene_sample_points(struct upt_scene *scene,
  * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
  * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of instruments.
  */
-upt_status upt_scene_instrument_readings(struct upt_scene *scene,
-                                         struct upt_instrument_reading *out,
-                                         uint64_t count);
+upt_status upt_scene_read_instruments(struct upt_scene *scene,
+                                      struct upt_instrument_reading *out,
+                                      uint64_t count);
 
 /**
  * Copies the points of the surface that pushed or held instruments at the end of the last step, ascending by instrument.
@@ -1983,10 +2041,10 @@ upt_status upt_scene_instrument_readings(struct upt_scene *scene,
  * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
  * `UPT_ERR_ARGUMENT` if capacity is too small.
  */
-upt_status upt_scene_instrument_contacts(struct upt_scene *scene,
-                                         struct upt_instrument_contact *out,
-                                         uint64_t capacity,
-                                         uint64_t *needed);
+upt_status upt_scene_read_instrument_contacts(struct upt_scene *scene,
+                                              struct upt_instrument_contact *out,
+                                              uint64_t capacity,
+                                              uint64_t *needed);
 
 /**
  * Creates the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
@@ -2021,9 +2079,9 @@ upt_status upt_hull_destroy(struct upt_hull *hull);
  * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
  * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of ties.
  */
-upt_status upt_scene_tie_readings(struct upt_scene *scene,
-                                  struct upt_tie_reading *out,
-                                  uint64_t count);
+upt_status upt_scene_read_ties(struct upt_scene *scene,
+                               struct upt_tie_reading *out,
+                               uint64_t count);
 
 /**
  * Finds the points of the tissue nearest to places, for ties: of the domain, the surface that instruments may touch, where it is in the last state.
@@ -2163,15 +2221,15 @@ upt_status upt_scene_drop_fragments(struct upt_scene *scene,
  * Threads: any, at any time, even while a step runs.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` for a place that is not aligned, `UPT_ERR_PANIC`.
  */
-upt_status upt_scene_node_count(struct upt_scene *scene,
-                                uint64_t *out);
+upt_status upt_scene_read_node_count(struct upt_scene *scene,
+                                     uint64_t *out);
 
 /**
  * Brings the closed surface of the body up to date: the mesh's own where nothing has happened, the lips of cuts, and what removal has laid
  * bare. Tells what has changed since the last call. Where the body has not changed since, it does nothing, so it may be called in every frame.
  *
  * Vertices and slots of triangles keep their numbers, so that a renderer uploads the vertices from `first_vertex` on and the slots that
- * `upt_scene_surface` lists, unless `is_new` is 1. The first vertices are the nodes of the mesh, also those inside, which no triangle has;
+ * `upt_scene_read_surface` lists, unless `is_new` is 1. The first vertices are the nodes of the mesh, also those inside, which no triangle has;
  * vertices that nothing uses any more stay. Works on an intact body, too.
  *
  * - `out`: counts; set `struct_size`.
@@ -2195,14 +2253,14 @@ upt_status upt_scene_update_surface(struct upt_scene *scene,
  * Errors: `UPT_ERR_STATE` before the first update, `UPT_ERR_ARGUMENT` for other counts and an array that is not aligned, `UPT_ERR_HANDLE`,
  * `UPT_ERR_NULL` for the scene, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
  */
-upt_status upt_scene_surface(struct upt_scene *scene,
-                             float *rest,
-                             uint64_t vertex_count,
-                             uint32_t *triangles,
-                             uint8_t *inside,
-                             uint64_t triangle_count,
-                             uint32_t *changed,
-                             uint64_t changed_count);
+upt_status upt_scene_read_surface(struct upt_scene *scene,
+                                  float *rest,
+                                  uint64_t vertex_count,
+                                  uint32_t *triangles,
+                                  uint8_t *inside,
+                                  uint64_t triangle_count,
+                                  uint32_t *changed,
+                                  uint64_t changed_count);
 
 /**
  * Copies where the vertices of the surface are in the last published state.
@@ -2214,9 +2272,9 @@ upt_status upt_scene_surface(struct upt_scene *scene,
  * Errors: `UPT_ERR_STATE` where the body has changed since the last `upt_scene_update_surface`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` for a scene
  * with a region, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
  */
-upt_status upt_scene_surface_positions(struct upt_scene *scene,
-                                       float *out,
-                                       uint64_t out_count);
+upt_status upt_scene_read_surface_positions(struct upt_scene *scene,
+                                            float *out,
+                                            uint64_t out_count);
 
 /**
  * The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
@@ -2232,7 +2290,7 @@ upt_status upt_scene_surface_positions(struct upt_scene *scene,
  *   those of the step. Neither `displacement` nor `time_s` may be set. NULL: nothing touches the tissue.
  * - `when`: the moment on the clock of the steps' `time_s`, s, not before that of the last published step; for hosts whose steps have
  *   no time, the time since the last published step. Velocities are followed for two steps at most.
- * - `view`: the region, the attached points, or the vertices of the surface, `rest + out` of `upt_scene_surface`; NULL: the region.
+ * - `view`: the region, the attached points, or the vertices of the surface, `rest + out` of `upt_scene_read_surface`; NULL: the region.
  * - `out`: `[n,3]`, mm, in the view's order.
  * - `out_count`: number of floats in `out`, 3 n.
  *
@@ -2337,19 +2395,28 @@ upt_status upt_scene_contacts_from_instruments(struct upt_scene *scene,
  * Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
  * `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; `UPT_ERR_UNSUPPORTED` also for a cut body.
  */
-upt_status upt_scene_contact_force(struct upt_scene *scene,
-                                   float *out,
-                                   uint64_t out_count);
+upt_status upt_scene_read_contact_force(struct upt_scene *scene,
+                                        float *out,
+                                        uint64_t out_count);
 
 /**
- * Reports what the last step did and how long it took. Set `out->struct_size` first. Works while a step is in flight and
+ * Reports what the last step did. Set `out->struct_size` first. Works while a step is in flight and
  * on a poisoned scene.
  *
  * Threads: any.
  * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
  */
-upt_status upt_scene_get_stats(const struct upt_scene *scene,
-                               struct upt_scene_stats *out);
+upt_status upt_scene_read_stats(const struct upt_scene *scene,
+                                struct upt_scene_stats *out);
+
+/**
+ * Reports how long the last step and its stages took. Set `out->struct_size` first. Works as `upt_scene_read_stats` does.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+ */
+upt_status upt_scene_read_timing(const struct upt_scene *scene,
+                                 struct upt_scene_timing *out);
 
 /**
  * Saves the state, so that it can be restored exactly.

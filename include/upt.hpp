@@ -104,6 +104,7 @@ using model_options = upt_model_options;
 using model_info = upt_model_info;
 using scene_options = upt_scene_options;
 using scene_stats = upt_scene_stats;
+using scene_timing = upt_scene_timing;
 using instrument = upt_instrument;
 using instrument_reading = upt_instrument_reading;
 using instrument_contact = upt_instrument_contact;
@@ -139,8 +140,19 @@ inline upt_instrument box(float x, float y, float z) noexcept {
   return made;
 }
 
+/// Corrections of a step: `count` of them; with a target (mm) or a budget (µs) at most so many.
+inline upt_corrections corrections(std::uint32_t count, float target_mm = 0.0F,
+                                   std::uint32_t budget_us = 0) noexcept {
+  return {UPT_CORRECTIONS_COUNT, count, budget_us, target_mm};
+}
+/// The same by a mode that needs no count: UPT_CORRECTIONS_NONE, _RECOMMENDED, _AUTO.
+inline upt_corrections corrections(upt_corrections_mode mode, float target_mm = 0.0F,
+                                   std::uint32_t budget_us = 0) noexcept {
+  return {mode, 0, budget_us, target_mm};
+}
+
 /// What is shown: UPT_VIEW_*.
-inline upt_view view(std::int32_t kind) noexcept {
+inline upt_view view(upt_view_kind kind) noexcept {
   upt_view made = make<upt_view>();
   made.kind = kind;
   return made;
@@ -233,7 +245,7 @@ private:
 
 inline upt_status init(const upt_init_options &options) { return check(upt_init(&options)); }
 inline upt_status shutdown() { return check(upt_shutdown()); }
-inline upt_status set_log(upt_log_fn callback, void *user, std::int32_t level) {
+inline upt_status set_log(upt_log_fn callback, void *user, upt_log_level level) {
   return check(upt_set_log(callback, user, level));
 }
 
@@ -256,7 +268,7 @@ public:
   /// Opens the bundle in the folder `path` (UTF-8). Closes a model that this object already held.
   upt_status reopen(const char *path, const upt_model_options *options = nullptr) {
     upt_model *handle = nullptr;
-    const upt_status status = check(upt_model_open(path, options, &handle));
+    const upt_status status = check(upt_model_create(path, options, &handle));
     if (status == UPT_OK) {
       close();
       handle_ = handle;
@@ -267,7 +279,7 @@ public:
   /// Scenes made from the model stay usable.
   void close() noexcept {
     if (handle_ != nullptr) {
-      upt_model_close(std::exchange(handle_, nullptr));
+      upt_model_destroy(std::exchange(handle_, nullptr));
     }
   }
 
@@ -276,19 +288,19 @@ public:
 
   upt_status info(upt_model_info &out) const {
     out = make<upt_model_info>();
-    return check(upt_model_get_info(handle_, &out));
+    return check(upt_model_read_info(handle_, &out));
   }
   upt_status positions(span<float> out) const {
-    return check(upt_model_positions(handle_, out.data(), out.size()));
+    return check(upt_model_read_positions(handle_, out.data(), out.size()));
   }
-  upt_status indices(std::int32_t set, std::vector<std::uint32_t> &out) const {
+  upt_status indices(upt_index_set set, std::vector<std::uint32_t> &out) const {
     std::uint64_t needed = 0;
-    const upt_status status = check(upt_model_indices(handle_, set, nullptr, 0, &needed));
+    const upt_status status = check(upt_model_read_indices(handle_, set, nullptr, 0, &needed));
     if (status != UPT_OK) {
       return status;
     }
     out.resize(static_cast<std::size_t>(needed));
-    return check(upt_model_indices(handle_, set, out.data(), out.size(), &needed));
+    return check(upt_model_read_indices(handle_, set, out.data(), out.size(), &needed));
   }
   upt_status describe(std::string &out) const {
     std::uint64_t needed = 0;
@@ -320,7 +332,7 @@ public:
     positions(out);
     return out;
   }
-  std::vector<std::uint32_t> indices(std::int32_t set) const {
+  std::vector<std::uint32_t> indices(upt_index_set set) const {
     std::vector<std::uint32_t> out;
     indices(set, out);
     return out;
@@ -523,14 +535,14 @@ public:
     for (upt_instrument_reading &reading : out) {
       reading = make<upt_instrument_reading>();
     }
-    return check(upt_scene_instrument_readings(handle_, out.data(), out.size()));
+    return check(upt_scene_read_instruments(handle_, out.data(), out.size()));
   }
   /// What each tie of the last step does; out has one element for each.
   upt_status tie_readings(span<upt_tie_reading> out) {
     for (upt_tie_reading &reading : out) {
       reading = make<upt_tie_reading>();
     }
-    return check(upt_scene_tie_readings(handle_, out.data(), out.size()));
+    return check(upt_scene_read_ties(handle_, out.data(), out.size()));
   }
   /// The point of the tissue nearest to a place (mm) becomes that of a tie.
   upt_status tie_point(const float *place, upt_tie &tie) {
@@ -549,10 +561,10 @@ public:
   /// The points of the surface that push or hold instruments at the end of the last step.
   upt_status instrument_contacts(std::vector<upt_instrument_contact> &out) {
     std::uint64_t needed = 0;
-    upt_status status = check(upt_scene_instrument_contacts(handle_, nullptr, 0, &needed));
+    upt_status status = check(upt_scene_read_instrument_contacts(handle_, nullptr, 0, &needed));
     if (status == UPT_OK) {
       out.resize(static_cast<std::size_t>(needed));
-      status = check(upt_scene_instrument_contacts(handle_, out.data(), out.size(), &needed));
+      status = check(upt_scene_read_instrument_contacts(handle_, out.data(), out.size(), &needed));
       out.resize(static_cast<std::size_t>(needed));
     }
     return status;
@@ -570,12 +582,12 @@ public:
                                                      vectors.data(), nodes.size(), &count));
   }
   upt_status contact_force(span<float> out) {
-    return check(upt_scene_contact_force(handle_, out.data(), out.size()));
+    return check(upt_scene_read_contact_force(handle_, out.data(), out.size()));
   }
 
   /// K, and the copies of nodes that cuts have made: outputs have three floats for each.
   upt_status node_count(std::uint64_t &out) const {
-    return check(upt_scene_node_count(handle_, &out));
+    return check(upt_scene_read_node_count(handle_, &out));
   }
   /// Cuts along a blade edge's way; poses: [poses,edge_points,3], mm. One stroke is one blade; one
   /// with a fracture energy feels the tissue: out.force.
@@ -617,18 +629,22 @@ public:
     out.changed.resize(static_cast<std::size_t>(now.changed_count));
     out.first_vertex = static_cast<std::size_t>(now.first_vertex);
     out.is_new = now.is_new != 0;
-    return check(upt_scene_surface(handle_, out.rest.data(), now.vertex_count, out.triangles.data(),
+    return check(upt_scene_read_surface(handle_, out.rest.data(), now.vertex_count, out.triangles.data(),
                                    out.inside.data(), now.triangle_count, out.changed.data(),
                                    now.changed_count));
   }
   /// Where the vertices of the last surface are in the last state; out: [v,3], mm.
   upt_status surface_positions(span<float> out) {
-    return check(upt_scene_surface_positions(handle_, out.data(), out.size()));
+    return check(upt_scene_read_surface_positions(handle_, out.data(), out.size()));
   }
 
   upt_status stats(upt_scene_stats &out) const {
     out = make<upt_scene_stats>();
-    return check(upt_scene_get_stats(handle_, &out));
+    return check(upt_scene_read_stats(handle_, &out));
+  }
+  upt_status timing(upt_scene_timing &out) const {
+    out = make<upt_scene_timing>();
+    return check(upt_scene_read_timing(handle_, &out));
   }
   upt_status save(std::vector<std::uint8_t> &out) {
     std::uint64_t needed = 0;
@@ -647,6 +663,11 @@ public:
   upt_scene_stats stats() const {
     upt_scene_stats out;
     stats(out);
+    return out;
+  }
+  upt_scene_timing timing() const {
+    upt_scene_timing out;
+    timing(out);
     return out;
   }
   /// count: instruments of the last step.
@@ -902,8 +923,8 @@ private:
   // The steps that are due before the last one, in a host whose frames come slower than steps.
   upt_status catch_up(Scene &scene, double now) {
     for (int made = 0; made < MOST_MADE && behind(now); made++) {
-      upt_scene_stats stats = make<upt_scene_stats>();
-      if (upt_scene_get_stats(scene.get(), &stats) != UPT_OK || stats.step_ms > 500 * dt_) {
+      upt_scene_timing last = make<upt_scene_timing>();
+      if (upt_scene_read_timing(scene.get(), &last) != UPT_OK || last.step_ms > 500 * dt_) {
         break;
       }
       const std::vector<upt_instrument> &poses = start(now);
@@ -929,7 +950,7 @@ private:
   // Whether a step has been published since the last look; poll() may not have told yet.
   bool look(Scene &scene) {
     upt_scene_stats stats = make<upt_scene_stats>();
-    if (upt_scene_get_stats(scene.get(), &stats) != UPT_OK || stats.step_count == counted_) {
+    if (upt_scene_read_stats(scene.get(), &stats) != UPT_OK || stats.step_count == counted_) {
       return false;
     }
     counted_ = stats.step_count;

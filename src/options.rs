@@ -199,8 +199,8 @@ pub struct SceneOptions {
     pub guard_policy: GuardPolicy,
     /// A mesh of the scene's own (`upt` bundles without a prior); `None` takes the bundle's.
     pub mesh_path: Option<PathBuf>,
-    /// Do not enforce held and contact nodes.
-    pub free_boundary: bool,
+    /// Held nodes and nodes in contact are where they belong; otherwise where the networks put them.
+    pub boundary: bool,
     /// Tissue at rest sleeps.
     pub sleep: bool,
     /// Check the sign of every decoded tetrahedron's volume.
@@ -276,7 +276,7 @@ impl Default for SceneOptions {
             precision: None,
             guard_policy: GuardPolicy::Hold,
             mesh_path: None,
-            free_boundary: false,
+            boundary: true,
             sleep: true,
             check_inversion: false,
             latest_wins: false,

@@ -38,8 +38,8 @@ fn every_call_of_a_host_that_traps_exceptions_returns() {
         fixture::find_runtime();
         let path = std::ffi::CString::new(fixture::path(bundle).to_str().unwrap()).unwrap();
         let mut model = std::ptr::null_mut();
-        let status = trapped("upt_model_open", || unsafe {
-            upt_model_open(path.as_ptr(), std::ptr::null(), &mut model)
+        let status = trapped("upt_model_create", || unsafe {
+            upt_model_create(path.as_ptr(), std::ptr::null(), &mut model)
         });
         assert_eq!(status, UPT_OK, "{}", host::message());
         let mut scene = std::ptr::null_mut();
@@ -85,8 +85,8 @@ fn every_call_of_a_host_that_traps_exceptions_returns() {
             });
             assert_eq!((read, sample), (UPT_OK, UPT_ERR_NON_FINITE));
             if host::stats(scene).contact_count == nodes.len() as u64 {
-                let force = trapped("upt_scene_contact_force", || unsafe {
-                    upt_scene_contact_force(scene, forces.as_mut_ptr(), forces.len() as u64)
+                let force = trapped("upt_scene_read_contact_force", || unsafe {
+                    upt_scene_read_contact_force(scene, forces.as_mut_ptr(), forces.len() as u64)
                 });
                 assert_eq!(force, UPT_OK, "{}", host::message());
             }

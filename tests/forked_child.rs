@@ -32,7 +32,7 @@ fn calls_of_a_forked_child_are_refused_and_the_parent_goes_on() {
             unsafe { upt_scene_wait(host.scene, u32::MAX) },
             host.step(&domain[..1], [0.0, 0.0, -1.0]),
             unsafe { upt_scene_destroy(host.scene) },
-            unsafe { upt_model_close(host.model) },
+            unsafe { upt_model_destroy(host.model) },
             unsafe { upt_set_log(None, null_mut(), UPT_LOG_OFF) },
             unsafe { upt_shutdown() },
         ];

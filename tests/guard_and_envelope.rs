@@ -287,7 +287,7 @@ fn held_nodes_stay_and_contact_nodes_end_at_c() {
         let free = fixture::scene(
             &model,
             &SceneOptions {
-                free_boundary: true,
+                boundary: false,
                 ..with_policy(GuardPolicy::Report)
             },
         );

@@ -54,8 +54,10 @@ const CONSTANTS: &[(&str, i64, i64)] = constants! {
     UPT_STEP_SPLIT = 1,
     UPT_STEP_WHOLE = 2,
     UPT_STEP_MEASURED = 3,
-    UPT_CORRECTIONS_NONE = -1,
-    UPT_CORRECTIONS_AUTO = -2,
+    UPT_CORRECTIONS_RECOMMENDED = 0,
+    UPT_CORRECTIONS_NONE = 1,
+    UPT_CORRECTIONS_COUNT = 2,
+    UPT_CORRECTIONS_AUTO = 3,
     UPT_GUARD_HOLD = 0,
     UPT_GUARD_REPORT = 1,
     UPT_GUARD_BLEND = 2,
@@ -106,8 +108,13 @@ fn the_header_holds_these_constants_and_no_others() {
     let header = std::fs::read_to_string("include/upt.h").unwrap();
     let defined: Vec<(&str, i64)> = header
         .lines()
-        .filter_map(|line| line.strip_prefix("#define UPT_")?.split_once(' '))
-        .filter_map(|(name, value)| Some((name, value.parse().ok()?)))
+        .filter_map(|line| {
+            let (name, value) = match line.strip_prefix("#define UPT_") {
+                Some(version) => version.split_once(' ')?,
+                None => line.trim().strip_prefix("UPT_")?.split_once(" = ")?,
+            };
+            Some((name, value.trim_end_matches(',').parse().ok()?))
+        })
         .collect();
     assert!(defined.len() > 60);
     for (name, value) in &defined {

@@ -85,7 +85,7 @@ fn memory_is_stated_to_ten_percent_and_given_back() {
             let scenes = stepped(model, &options, 8);
             let mut positions = vec![0.0f32; 3 * host::node_count(model)];
             let count = positions.len() as u64;
-            let read = unsafe { upt_model_positions(model, positions.as_mut_ptr(), count) };
+            let read = unsafe { upt_model_read_positions(model, positions.as_mut_ptr(), count) };
             assert_eq!(read, UPT_OK);
             for &scene in &scenes {
                 let status = unsafe { upt_scene_attach_points(scene, positions.as_ptr(), points) };
@@ -104,7 +104,7 @@ fn memory_is_stated_to_ten_percent_and_given_back() {
             );
             destroy(scenes);
         }
-        assert_eq!(unsafe { upt_model_close(model) }, UPT_OK);
+        assert_eq!(unsafe { upt_model_destroy(model) }, UPT_OK);
     }
     let model = host::open(&brain("brain-reduced"));
     let options = host::scene_options();
@@ -121,5 +121,5 @@ fn memory_is_stated_to_ten_percent_and_given_back() {
         after - before < 0.02 * (most - before),
         "{after} bytes are resident, {before} were before"
     );
-    assert_eq!(unsafe { upt_model_close(model) }, UPT_OK);
+    assert_eq!(unsafe { upt_model_destroy(model) }, UPT_OK);
 }

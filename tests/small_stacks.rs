@@ -43,7 +43,7 @@ fn calls_stay_within_the_stated_stack() {
                 let mut positions = vec![0.0f32; 3 * host.nodes];
                 let count = positions.len() as u64;
                 unsafe {
-                    let read = upt_model_positions(host.model, positions.as_mut_ptr(), count);
+                    let read = upt_model_read_positions(host.model, positions.as_mut_ptr(), count);
                     assert_eq!(read, UPT_OK);
                     let place = positions[3 * first..].as_ptr();
                     assert_eq!(upt_scene_attach_points(host.scene, place, 1), UPT_OK);

@@ -31,7 +31,7 @@ unsafe extern "C" fn hear(_: i32, text: *const c_char, _: *mut c_void) {
 fn ball(host: &Host, depth: f32) -> upt_instrument {
     let mut positions = vec![0.0f32; 3 * host.nodes];
     let floats = positions.len() as u64;
-    let read = unsafe { upt_model_positions(host.model, positions.as_mut_ptr(), floats) };
+    let read = unsafe { upt_model_read_positions(host.model, positions.as_mut_ptr(), floats) };
     assert_eq!(read, UPT_OK);
     let domain = indices(host.model, UPT_SET_DOMAIN_NODES);
     let at = 3 * domain[domain.len() / 2] as usize;
@@ -74,7 +74,9 @@ fn each_step_is_there_with_what_it_did_inside_of_it() {
     let file = folder.path().join("steps \"1\".json");
     // SAFETY: no other thread of this process runs yet.
     unsafe { std::env::set_var("UPT_TRACE", &file) };
-    let host = Host::new("tiny-corrected", |options| options.corrections = 3);
+    let host = Host::new("tiny-corrected", |options| {
+        (options.corrections.mode, options.corrections.count) = (UPT_CORRECTIONS_COUNT, 3)
+    });
     for number in 1..=4 {
         step(&host, 0.2 * number as f32);
         // Whole after each step, not only at the end.

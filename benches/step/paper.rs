@@ -54,7 +54,7 @@ pub fn against_split(
         let scene = Scene::new(
             Arc::clone(model),
             &SceneOptions {
-                free_boundary: true,
+                boundary: false,
                 ..options(threads)
             },
         )?;

@@ -39,7 +39,7 @@ pub fn against_split(
         let mut split = Split::new(graphs, model, kind, threads, ProviderPlan::cpu())?;
         split.set_contact(kind, &nodes, &vectors, &linear);
         let free = SceneOptions {
-            free_boundary: true,
+            boundary: false,
             ..options(threads)
         };
         let scene = Scene::new(Arc::clone(model), &free)?;

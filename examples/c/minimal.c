@@ -35,9 +35,9 @@ static void *allocate(size_t count, size_t size) {
 
 static uint32_t *indices(const upt_model *model, int32_t set, uint64_t *count) {
   uint32_t *out;
-  require(upt_model_indices(model, set, NULL, 0, count));
+  require(upt_model_read_indices(model, set, NULL, 0, count));
   out = allocate((size_t)*count, sizeof *out);
-  require(upt_model_indices(model, set, out, *count, count));
+  require(upt_model_read_indices(model, set, out, *count, count));
   return out;
 }
 
@@ -69,7 +69,7 @@ int main(int argc, char **argv) {
   upt_model *model = NULL;
   upt_scene *scene = NULL;
   upt_model_info info;
-  upt_scene_stats stats;
+  upt_scene_timing timing;
   upt_input input;
   float *positions, *displacement, *vectors;
   uint32_t *domain, *faces, *patch;
@@ -88,10 +88,10 @@ int main(int argc, char **argv) {
     return 1;
   }
 
-  require(upt_model_open(argv[1], NULL, &model));
+  require(upt_model_create(argv[1], NULL, &model));
   memset(&info, 0, sizeof info);
   info.struct_size = sizeof info;
-  require(upt_model_get_info(model, &info));
+  require(upt_model_read_info(model, &info));
   require(upt_scene_create(model, NULL, &scene));
   printf("libupt %s, %s bundle, K = %lu, opened in %.0f ms\n", upt_version(),
          info.kind == UPT_KIND_REDUCED ? "reduced" : "upt", (unsigned long)info.node_count,
@@ -99,7 +99,7 @@ int main(int argc, char **argv) {
 
   positions = allocate(3 * (size_t)info.node_count, sizeof *positions);
   displacement = allocate(3 * (size_t)info.node_count, sizeof *displacement);
-  require(upt_model_positions(model, positions, 3 * info.node_count));
+  require(upt_model_read_positions(model, positions, 3 * info.node_count));
   domain = indices(model, UPT_SET_DOMAIN_NODES, &domain_count);
   faces = indices(model, UPT_SET_DOMAIN_FACES, &face_count);
   if (domain_count == 0) {
@@ -142,10 +142,10 @@ int main(int argc, char **argv) {
     }
     input.contact_count = contact_count;
     require(upt_scene_step(scene, &input, displacement, 3 * info.node_count));
-    memset(&stats, 0, sizeof stats);
-    stats.struct_size = sizeof stats;
-    require(upt_scene_get_stats(scene, &stats));
-    times[step] = stats.step_ms;
+    memset(&timing, 0, sizeof timing);
+    timing.struct_size = sizeof timing;
+    require(upt_scene_read_timing(scene, &timing));
+    times[step] = timing.step_ms;
     for (i = 0; i < info.node_count; i++) {
       const float zero[3] = {0.0F, 0.0F, 0.0F};
       const double size = distance(displacement + 3 * i, zero);
@@ -160,7 +160,7 @@ int main(int argc, char **argv) {
   printf("largest displacement %.2f mm\n", largest);
 
   require(upt_scene_destroy(scene));
-  require(upt_model_close(model));
+  require(upt_model_destroy(model));
   require(upt_shutdown());
   free(times);
   free(vectors);

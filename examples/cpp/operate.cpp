@@ -193,9 +193,9 @@ static Vec3 mean_of(upt::Scene &scene, const std::vector<std::uint32_t> &nodes) 
 // The nodes of a support group.
 static std::vector<std::uint32_t> group_of(const upt::Model &model, std::uint32_t group) {
   std::uint64_t count = 0;
-  upt_model_support(model.get(), group, nullptr, 0, nullptr, 0, &count);
+  upt_model_read_support(model.get(), group, nullptr, 0, nullptr, 0, &count);
   std::vector<std::uint32_t> nodes(static_cast<std::size_t>(count));
-  upt::check(upt_model_support(model.get(), group, nullptr, 0, nodes.data(), count, &count));
+  upt::check(upt_model_read_support(model.get(), group, nullptr, 0, nodes.data(), count, &count));
   return nodes;
 }
 

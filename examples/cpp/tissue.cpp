@@ -174,7 +174,7 @@ void Tissue::count_step(std::size_t instruments) {
     reading_ = scene_.readings(instruments).front();
   }
   counted_steps_ = last.step_count;
-  step_ms_.push_back(last.step_ms);
+  step_ms_.push_back(scene_.timing().step_ms);
 }
 
 void Tissue::sample(double now) {

@@ -52,6 +52,7 @@ public:
   upt::Scene &scene() { return scene_; }
   const upt_model_info &info() const { return info_; }
   upt_scene_stats stats() const { return scene_.stats(); }
+  upt_scene_timing timing() const { return scene_.timing(); }
   void reset();
   // From now on what holds the organ goes up and down by 15 mm in four seconds.
   void breathe();

@@ -263,7 +263,8 @@ void View::draw_numbers(const Tissue &tissue, const Spatula &spatula, int width,
   const upt_scene_stats stats = tissue.stats();
   char line[160];
   overlay_.begin(width, height);
-  std::snprintf(line, sizeof line, "FRAME %5.1f MS   STEP %5.2f MS", frame_ms, stats.step_ms);
+  std::snprintf(line, sizeof line, "FRAME %5.1f MS   STEP %5.2f MS", frame_ms,
+                tissue.timing().step_ms);
   overlay_.text(16, 16, 2, line, bright);
   std::snprintf(line, sizeof line, "K %llu   CONTACT NODES %llu   PUSH %4.1f MM   MAX %4.1f MM%s",
                 static_cast<unsigned long long>(tissue.info().node_count),

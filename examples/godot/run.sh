@@ -86,7 +86,7 @@ refused() { # name message options...
     tail -n 20 "$build/$name.log"
   fi
 }
-refused lone-target corrections_target_mm --bundle="$bundle" --target=0.1
+refused lone-target corrections.target_mm --bundle="$bundle" --target=0.1
 refused substeps substeps --bundle="$bundle" --corrections=3 --target=0.1 --substeps=300
 refused step step_s --bundle="$bundle" --step=0.5
 

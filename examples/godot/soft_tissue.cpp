@@ -174,7 +174,7 @@ static void wait(void *instance, const GDExtensionConstTypePtr *, GDExtensionTyp
 static void step_ms(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto &out = *static_cast<double *>(result);
   out = 0;
-  opened(instance, [&](const Tissue &tissue) { out = tissue.stats().step_ms; });
+  opened(instance, [&](const Tissue &tissue) { out = tissue.timing().step_ms; });
 }
 
 static void contact_count(void *instance, const GDExtensionConstTypePtr *,

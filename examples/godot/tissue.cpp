@@ -11,9 +11,19 @@ static upt::Scene make_scene(const upt::Model &model, const Effort &effort, doub
     throw std::runtime_error("substeps is " + std::to_string(effort.substeps));
   }
   auto options = upt::make<upt_scene_options>();
-  const std::int64_t most = std::numeric_limits<std::int32_t>::max();
-  options.corrections = static_cast<std::int32_t>(std::clamp(effort.corrections, -most, most));
-  options.corrections_target_mm = static_cast<float>(effort.target_mm);
+  const auto target_mm = static_cast<float>(effort.target_mm);
+  switch (effort.corrections) {
+  case 0:
+    options.corrections = upt::corrections(UPT_CORRECTIONS_RECOMMENDED, target_mm);
+    break;
+  case -1:
+    options.corrections = upt::corrections(UPT_CORRECTIONS_NONE, target_mm);
+    break;
+  default:
+    const std::int64_t most = std::numeric_limits<std::uint32_t>::max();
+    const auto count = effort.corrections < 0 ? most : std::min(effort.corrections, most);
+    options.corrections = upt::corrections(static_cast<std::uint32_t>(count), target_mm);
+  }
   options.substeps = static_cast<std::uint8_t>(effort.substeps);
   options.step_s = step_s;
   return upt::Scene(model, &options);

@@ -9,7 +9,7 @@
 
 // How much work a step in contact gets; as upt_scene_options. Zeros: what the bundle recommends.
 struct Effort {
-  std::int64_t corrections = 0; // at most; UPT_CORRECTIONS_NONE: none
+  std::int64_t corrections = 0; // at most; -1: none, 0: as the bundle recommends
   double target_mm = 0;         // enough where the estimated error is below; with `corrections`
   std::int64_t substeps = 0;    // at most; from 2 with a target
   double step_s = 0;            // length of a step; zero with corrections: recommended for frames
@@ -39,6 +39,7 @@ public:
   // Of the last step that a frame took: zero without a tool.
   const upt_instrument_reading &reading() const { return reading_; }
   upt_scene_stats stats() const { return scene_.stats(); }
+  upt_scene_timing timing() const { return scene_.timing(); }
 
 private:
   void follow(double now, upt::span<const upt_instrument> tools);

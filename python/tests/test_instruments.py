@@ -57,7 +57,7 @@ def test_a_press_is_read_and_a_lift_ends_it(corrected):
         contacts = scene.instrument_contacts()
         assert [contact.instrument for contact in contacts] == [0] * touched.contact_count
         np.testing.assert_allclose(np.sum([contact.force for contact in contacts], axis=0), force, rtol=1e-3, atol=1e-2)
-        assert scene.stats.contact_ms > 0
+        assert scene.timing.contact_ms > 0
         ball.position = pressing(corrected, -30.0)
         scene.step([ball, other])
         assert scene.readings()[0].force == (0.0, 0.0, 0.0) and scene.instrument_contacts() == []

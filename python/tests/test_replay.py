@@ -18,7 +18,7 @@ def test_a_recorder_writes_what_the_scene_was_given(tmp_path):
         with pytest.raises(ValueError, match="gravity, and no other load"):
             recorder.step([ball], loads=upt.Loads(pressures=[(None, 100.0)]))
     header, first, second, end = [json.loads(line) for line in place.read_text().splitlines()]
-    assert header["portable"] and header["scene"]["corrections"] == 3 and end == {"end": 2}
+    assert header["portable"] and header["scene"]["corrections"]["count"] == 3 and end == {"end": 2}
     assert header["bundle_sha256"] == model.describe()["bundle_sha256"]
     assert first["step"]["instruments"][0]["position"] == [float(x) for x in tip + (0, 0, 3)]
     assert "sha256" not in first["step"] and second["step"]["gravity"] == [0, 0, -1]

@@ -18,6 +18,8 @@ from typing import Any
 from upt._library import check, ensure_started, init, lib, read_text
 from upt._native import (
     ABI_VERSION,
+    Corrections,
+    CorrectionsMode,
     Cut,
     Flag,
     GuardPolicy,
@@ -35,6 +37,7 @@ from upt._native import (
     Provider,
     SceneOptions,
     SceneStats,
+    SceneTiming,
     Shape,
     Status,
     StepPath,
@@ -89,6 +92,8 @@ __all__ = [
     "Blade",
     "BundleError",
     "BusyError",
+    "Corrections",
+    "CorrectionsMode",
     "Cut",
     "Error",
     "Flag",
@@ -118,6 +123,7 @@ __all__ = [
     "Scene",
     "SceneOptions",
     "SceneStats",
+    "SceneTiming",
     "Shape",
     "StateError",
     "Status",

@@ -10,14 +10,14 @@ from collections.abc import Sequence
 from enum import IntEnum, IntFlag
 from typing import Any, TypedDict
 
-from upt._record import Record, boolean, choice, numbers, switch, text, vector
+from upt._record import Record, boolean, choice, corrections, numbers, switch, text, vector
 
 ABI_VERSION = 1
 """Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load."""
 
 
 class Status(IntEnum):
-    """`UPT_ERR_*`."""
+    """`UPT_ERR_*`. What a call returns: 0 is success, positive values are not errors, negative values are errors."""
 
     OK = 0
     """Success."""
@@ -60,7 +60,7 @@ class Status(IntEnum):
 
 
 class Provider(IntEnum):
-    """`UPT_PROVIDER_*`."""
+    """`UPT_PROVIDER_*`. What runs the networks of a model."""
 
     CPU = 0
     """ONNX Runtime's CPU provider and the native kernels."""
@@ -73,7 +73,7 @@ class Provider(IntEnum):
 
 
 class Kind(IntEnum):
-    """`UPT_KIND_*`."""
+    """`UPT_KIND_*`. What a model is."""
 
     UPT = 0
     """A Universal Physics Transformer."""
@@ -82,7 +82,7 @@ class Kind(IntEnum):
 
 
 class LogLevel(IntEnum):
-    """`UPT_LOG_*`."""
+    """`UPT_LOG_*`. How much the log tells."""
 
     OFF = 0
     """No messages."""
@@ -99,7 +99,7 @@ class LogLevel(IntEnum):
 
 
 class Precision(IntEnum):
-    """`UPT_PRECISION_*`."""
+    """`UPT_PRECISION_*`. Arithmetic of the heavy stages."""
 
     F32 = 0
     """32-bit floats: the reference. In a scene's options: the model's precision."""
@@ -114,7 +114,7 @@ class Precision(IntEnum):
 
 
 class Kernel(IntEnum):
-    """`UPT_KERNEL_*`."""
+    """`UPT_KERNEL_*`. What decodes."""
 
     AUTO = 0
     """The library chooses the decoder."""
@@ -127,7 +127,7 @@ class Kernel(IntEnum):
 
 
 class StepPath(IntEnum):
-    """`UPT_STEP_*`."""
+    """`UPT_STEP_*`. Who makes a step of a `UPT_KIND_UPT` bundle."""
 
     AUTO = 0
     """On the CPU: split. On a device: the faster of split and whole, timed while the scene is created."""
@@ -139,17 +139,21 @@ class StepPath(IntEnum):
     """The faster of split and whole, timed while the scene is created."""
 
 
-class Corrections(IntEnum):
-    """`UPT_CORRECTIONS_*`."""
+class CorrectionsMode(IntEnum):
+    """`UPT_CORRECTIONS_*`. How many corrections a step gets."""
 
-    NONE = -1
-    """No corrections."""
-    AUTO = -2
-    """As many corrections as the scene's target needs and its budget allows."""
+    RECOMMENDED = 0
+    """As many as the bundle recommends, until its own target is reached."""
+    NONE = 1
+    """None."""
+    COUNT = 2
+    """`count` of them; with a target or a budget at most so many."""
+    AUTO = 3
+    """As many as the target needs and the budget allows, up to 64."""
 
 
 class Switch(IntEnum):
-    """`UPT_SWITCH_*`."""
+    """`UPT_SWITCH_*`. A switch, for what is usually on."""
 
     DEFAULT = 0
     """A switch: as usual, which its field says."""
@@ -160,7 +164,7 @@ class Switch(IntEnum):
 
 
 class GuardPolicy(IntEnum):
-    """`UPT_GUARD_*`."""
+    """`UPT_GUARD_*`. What happens to a state that the guard refuses."""
 
     HOLD = 0
     """Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
@@ -172,7 +176,7 @@ class GuardPolicy(IntEnum):
 
 
 class Flag(IntFlag):
-    """`UPT_FLAG_*`."""
+    """`UPT_FLAG_*`. Bits of `flags`."""
 
     PUSH = 1
     """A push is longer than the model was trained on."""
@@ -210,7 +214,7 @@ class Flag(IntFlag):
 
 
 class IndexSet(IntEnum):
-    """`UPT_SET_*`."""
+    """`UPT_SET_*`. A static set of indices of a mesh."""
 
     SURFACE_NODES = 0
     """Nodes of the surface."""
@@ -227,7 +231,7 @@ class IndexSet(IntEnum):
 
 
 class ViewKind(IntEnum):
-    """`UPT_VIEW_*`."""
+    """`UPT_VIEW_*`. What is shown of a state."""
 
     REGION = 0
     """The region's nodes in its order; all nodes where there is no region."""
@@ -238,7 +242,7 @@ class ViewKind(IntEnum):
 
 
 class Shape(IntEnum):
-    """`UPT_SHAPE_*`."""
+    """`UPT_SHAPE_*`. Shape of an instrument."""
 
     CAPSULE = 0
     """An instrument's shape: a capsule along local y."""
@@ -253,7 +257,7 @@ class Shape(IntEnum):
 
 
 class Mode(IntEnum):
-    """`UPT_MODE_*`."""
+    """`UPT_MODE_*`. What an instrument does to the tissue."""
 
     SLIDE = 0
     """An instrument pushes, with Coulomb friction."""
@@ -263,7 +267,7 @@ class Mode(IntEnum):
 
 
 class End(IntEnum):
-    """`UPT_END_*`."""
+    """`UPT_END_*`. What a tie is tied to."""
 
     SUPPORT = 0
     """A tie's far end is in the mesh's frame, which goes with the support."""
@@ -302,7 +306,7 @@ class InitOptionsKeywords(TypedDict, total=False):
 
 
 class ModelOptions(Record):
-    """Options of `upt_model_open`."""
+    """Options of `upt_model_create`."""
 
     struct_size: int
     """`sizeof(upt_model_options)`."""
@@ -376,7 +380,7 @@ class ModelOptionsKeywords(TypedDict, total=False):
 
 
 class ModelInfo(Record):
-    """What a model is; filled by `upt_model_get_info`."""
+    """What a model is; filled by `upt_model_read_info`."""
 
     struct_size: int
     """`sizeof(upt_model_info)`, set by the caller."""
@@ -405,7 +409,7 @@ class ModelInfo(Record):
     memory_bytes: int
     """Host memory of the model."""
     load_seconds: float
-    """Wall time of `upt_model_open`."""
+    """Wall time of `upt_model_create`."""
     frame_step_s: float
     """The `step_s` of `upt_scene_options` that the bundle recommends to a host that shows frames (`upt_scene_present`), seconds; `dt` where it
     recommends no other. For scenes with the corrections that the bundle recommends."""
@@ -429,6 +433,26 @@ class ModelInfo(Record):
     ]
 
 
+class Corrections(Record):
+    """How many corrections by the elements a step gets while there is contact, in `upt_scene_options`."""
+
+    mode: CorrectionsMode = choice("_mode", CorrectionsMode)
+    """`UPT_CORRECTIONS_*`."""
+    count: int
+    """With `UPT_CORRECTIONS_COUNT` 1 to 64; otherwise 0."""
+    budget_us: int
+    """No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`."""
+    target_mm: float
+    """Corrections stop once the estimated error is below this, mm; 0: no target. Only with `UPT_CORRECTIONS_COUNT` and `UPT_CORRECTIONS_AUTO`."""
+
+    _fields_ = [
+        ("_mode", ctypes.c_int32),
+        ("count", ctypes.c_uint32),
+        ("budget_us", ctypes.c_uint32),
+        ("target_mm", ctypes.c_float),
+    ]
+
+
 class SceneOptions(Record):
     """Options of `upt_scene_create`."""
 
@@ -444,8 +468,8 @@ class SceneOptions(Record):
     """`UPT_GUARD_*`."""
     mesh_path: str | None = text("_mesh_path")
     """A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's."""
-    free_boundary: bool = boolean("_free_boundary")
-    """1: do not enforce held and contact nodes."""
+    boundary: bool | None = switch("_boundary")
+    """`UPT_SWITCH_*`: held nodes and nodes in contact are where they belong, usually on; off: where the networks put them."""
     sleep: bool | None = switch("_sleep")
     """`UPT_SWITCH_*`: tissue at rest sleeps, usually on."""
     check_inversion: bool = boolean("_check_inversion")
@@ -463,13 +487,8 @@ class SceneOptions(Record):
     """Zero."""
     step_path: StepPath = choice("_step_path", StepPath)
     """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
-    corrections: Corrections = choice("_corrections", Corrections)
-    """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-    `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets."""
-    corrections_budget_us: int
-    """No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`."""
-    corrections_target_mm: float
-    """Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
+    corrections: Corrections = corrections("_corrections", Corrections)
+    """Corrections by the elements while there is contact; all zero: as many as the bundle recommends."""
     error_limit_mm: float
     """`UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never."""
     step_s: float
@@ -486,7 +505,7 @@ class SceneOptions(Record):
         ("_precision", ctypes.c_int32),
         ("_guard_policy", ctypes.c_int32),
         ("_mesh_path", ctypes.c_char_p),
-        ("_free_boundary", ctypes.c_uint8),
+        ("_boundary", ctypes.c_uint8),
         ("_sleep", ctypes.c_uint8),
         ("_check_inversion", ctypes.c_uint8),
         ("_latest_wins", ctypes.c_uint8),
@@ -495,9 +514,7 @@ class SceneOptions(Record):
         ("substeps", ctypes.c_uint8),
         ("_reserved", ctypes.c_uint8 * 1),
         ("_step_path", ctypes.c_int32),
-        ("_corrections", ctypes.c_int32),
-        ("corrections_budget_us", ctypes.c_uint32),
-        ("corrections_target_mm", ctypes.c_float),
+        ("_corrections", Corrections),
         ("error_limit_mm", ctypes.c_float),
         ("step_s", ctypes.c_double),
         ("damping_per_s", ctypes.c_double),
@@ -517,8 +534,8 @@ class SceneOptionsKeywords(TypedDict, total=False):
     """`UPT_GUARD_*`."""
     mesh_path: str | os.PathLike[str] | None
     """A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's."""
-    free_boundary: bool
-    """1: do not enforce held and contact nodes."""
+    boundary: bool | None
+    """`UPT_SWITCH_*`: held nodes and nodes in contact are where they belong, usually on; off: where the networks put them."""
     sleep: bool | None
     """`UPT_SWITCH_*`: tissue at rest sleeps, usually on."""
     check_inversion: bool
@@ -535,12 +552,7 @@ class SceneOptionsKeywords(TypedDict, total=False):
     step_path: StepPath | str | int
     """`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle."""
     corrections: Corrections | str | int
-    """Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-    `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets."""
-    corrections_budget_us: int
-    """No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`."""
-    corrections_target_mm: float
-    """Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`."""
+    """Corrections by the elements while there is contact; all zero: as many as the bundle recommends."""
     error_limit_mm: float
     """`UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never."""
     step_s: float
@@ -685,7 +697,7 @@ class HapticForce(Record):
 
 
 class SceneStats(Record):
-    """What the last step did and cost; filled by `upt_scene_get_stats`."""
+    """What the last step did; filled by `upt_scene_read_stats`."""
 
     struct_size: int
     """`sizeof(upt_scene_stats)`, set by the caller."""
@@ -693,22 +705,6 @@ class SceneStats(Record):
     """`UPT_FLAG_*` of the last step."""
     step_count: int
     """Steps since creation or reset."""
-    step_ms: float
-    """The whole step, ms; the stages follow."""
-    check_ms: float
-    """Input checks, ms."""
-    prior_ms: float
-    """Contact solve and linear response, ms."""
-    encode_ms: float
-    """Encoder, ms."""
-    aggregate_ms: float
-    """Message mean, ms."""
-    latent_ms: float
-    """Latent network, or the whole step's graph, ms."""
-    decode_ms: float
-    """Decoder, ms."""
-    guard_ms: float
-    """Guard and publishing, ms."""
     decoded_node_count: int
     """Nodes decoded in the last step."""
     contact_count: int
@@ -732,21 +728,15 @@ class SceneStats(Record):
     poisoned: bool = boolean("_poisoned")
     """1: a bug was caught in an earlier call; only destroy is left."""
     prior_forces: bool = boolean("_prior_forces")
-    """1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces."""
+    """1: `upt_scene_read_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces."""
     substeps: int
     """Substeps of the last step; 0 if it was not split."""
     reserved: tuple[int, ...] = vector("_reserved")
     """Zero."""
-    upload_ms: float
-    """Part of the stages' times: copies to a device, ms; 0 on the CPU."""
-    download_ms: float
-    """Part of the stages' times: copies back from a device, ms; 0 on the CPU."""
     step_path: StepPath = choice("_step_path", StepPath)
     """`UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`."""
     corrections: int
     """Corrections made in the last step."""
-    corrections_ms: float
-    """Corrections, ms."""
     evaluations: int
     """Evaluations of the element forces in the last step."""
     residual: float
@@ -755,21 +745,11 @@ class SceneStats(Record):
     """Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections."""
     min_det: float
     """Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither."""
-    contact_ms: float
-    """Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
         ("_flags", ctypes.c_uint32),
         ("step_count", ctypes.c_uint64),
-        ("step_ms", ctypes.c_double),
-        ("check_ms", ctypes.c_double),
-        ("prior_ms", ctypes.c_double),
-        ("encode_ms", ctypes.c_double),
-        ("aggregate_ms", ctypes.c_double),
-        ("latent_ms", ctypes.c_double),
-        ("decode_ms", ctypes.c_double),
-        ("guard_ms", ctypes.c_double),
         ("decoded_node_count", ctypes.c_uint64),
         ("contact_count", ctypes.c_uint64),
         ("memory_bytes", ctypes.c_uint64),
@@ -784,16 +764,65 @@ class SceneStats(Record):
         ("_prior_forces", ctypes.c_uint8),
         ("substeps", ctypes.c_uint8),
         ("_reserved", ctypes.c_uint8 * 4),
-        ("upload_ms", ctypes.c_double),
-        ("download_ms", ctypes.c_double),
         ("_step_path", ctypes.c_int32),
         ("corrections", ctypes.c_uint32),
-        ("corrections_ms", ctypes.c_double),
         ("evaluations", ctypes.c_uint32),
         ("residual", ctypes.c_float),
         ("error_mm", ctypes.c_float),
         ("min_det", ctypes.c_float),
+    ]
+
+
+class SceneTiming(Record):
+    """What the last step took, in milliseconds; filled by `upt_scene_read_timing`."""
+
+    struct_size: int
+    """`sizeof(upt_scene_timing)`, set by the caller."""
+    reserved: tuple[int, ...] = vector("_reserved")
+    """Zero."""
+    step_count: int
+    """Steps since creation or reset, the last of which this is of: as in `upt_scene_stats`."""
+    step_ms: float
+    """The whole step, ms; the stages follow."""
+    check_ms: float
+    """Input checks, ms."""
+    prior_ms: float
+    """Contact solve and linear response, ms."""
+    encode_ms: float
+    """Encoder, ms."""
+    aggregate_ms: float
+    """Message mean, ms."""
+    latent_ms: float
+    """Latent network, or the whole step's graph, ms."""
+    decode_ms: float
+    """Decoder, ms."""
+    guard_ms: float
+    """Guard and publishing, ms."""
+    corrections_ms: float
+    """Corrections, ms."""
+    contact_ms: float
+    """Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections."""
+    upload_ms: float
+    """Part of the stages' times: copies to a device, ms; 0 on the CPU."""
+    download_ms: float
+    """Part of the stages' times: copies back from a device, ms; 0 on the CPU."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_reserved", ctypes.c_uint8 * 4),
+        ("step_count", ctypes.c_uint64),
+        ("step_ms", ctypes.c_double),
+        ("check_ms", ctypes.c_double),
+        ("prior_ms", ctypes.c_double),
+        ("encode_ms", ctypes.c_double),
+        ("aggregate_ms", ctypes.c_double),
+        ("latent_ms", ctypes.c_double),
+        ("decode_ms", ctypes.c_double),
+        ("guard_ms", ctypes.c_double),
+        ("corrections_ms", ctypes.c_double),
         ("contact_ms", ctypes.c_double),
+        ("upload_ms", ctypes.c_double),
+        ("download_ms", ctypes.c_double),
     ]
 
 
@@ -954,7 +983,7 @@ class Tie(Record):
 
 
 class TieReading(Record):
-    """What a tie does at the end of a step; filled by `upt_scene_tie_readings`."""
+    """What a tie does at the end of a step; filled by `upt_scene_read_ties`."""
 
     struct_size: int
     """`sizeof(upt_tie_reading)`, set by the caller, the same in every element of an array."""
@@ -1082,7 +1111,7 @@ class Instrument(Record):
 
 
 class InstrumentReading(Record):
-    """What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`."""
+    """What the tissue does to an instrument at the end of a step; filled by `upt_scene_read_instruments`."""
 
     struct_size: int
     """`sizeof(upt_instrument_reading)`, set by the caller, the same in every element of an array."""
@@ -1114,7 +1143,7 @@ class InstrumentReading(Record):
 
 
 class InstrumentContact(Record):
-    """A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`."""
+    """A point of the surface that pushes or holds an instrument; filled by `upt_scene_read_instrument_contacts`."""
 
     instrument: int
     """Place of the instrument in the step's array."""
@@ -1216,7 +1245,7 @@ class Surface(Record):
 
 
 class Support(Record):
-    """What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_support` names the groups."""
+    """What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_read_support` names the groups."""
 
     struct_size: int
     """`sizeof(upt_support)`, the same in every element of an array."""
@@ -1257,14 +1286,14 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_status_name": (ctypes.c_char_p, [ctypes.c_int32]),
     "upt_set_log": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int32]),
     "upt_providers": (ctypes.c_int32, [ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p]),
-    "upt_model_open": (ctypes.c_int32, [ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p]),
-    "upt_model_close": (ctypes.c_int32, [ctypes.c_void_p]),
-    "upt_model_get_info": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_model_create": (ctypes.c_int32, [ctypes.c_char_p, ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_model_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
+    "upt_model_read_info": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
     "upt_model_describe": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p]),
-    "upt_model_positions": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_model_indices": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_int32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
-    "upt_model_support": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
-    "upt_model_region": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_model_read_positions": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_model_read_indices": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_int32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_model_read_support": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_model_read_region": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_reset": (ctypes.c_int32, [ctypes.c_void_p]),
@@ -1280,11 +1309,11 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_attach_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_read_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_sample_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_instrument_readings": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_instrument_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_scene_read_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_read_instrument_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
-    "upt_scene_tie_readings": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_read_ties": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_tie_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_bed": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_cut": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_void_p]),
@@ -1292,17 +1321,18 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_remove": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_float, ctypes.c_void_p]),
     "upt_scene_scale_stiffness": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_float, ctypes.c_void_p]),
     "upt_scene_drop_fragments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
-    "upt_scene_node_count": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_scene_read_node_count": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_update_surface": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
-    "upt_scene_surface": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_surface_positions": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_read_surface": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_read_surface_positions": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_present": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_haptics_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_haptics_render": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_haptics_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_contacts_from_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
-    "upt_scene_contact_force": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_get_stats": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_scene_read_contact_force": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_read_stats": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
+    "upt_scene_read_timing": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_save": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_restore": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
 }

@@ -14,7 +14,7 @@ from typing import Any
 
 
 class Record(ctypes.Structure):
-    """A struct that begins with its own size."""
+    """A struct; where it begins with its own size, that is set."""
 
     def __init__(self, **values: Any) -> None:
         names = self.field_names()
@@ -22,7 +22,8 @@ class Record(ctypes.Structure):
             if name not in names:
                 raise TypeError(f"{type(self).__name__} has no field {name!r}; it has {', '.join(names)}")
         super().__init__(**values)
-        self.struct_size = ctypes.sizeof(self)
+        if self._fields_[0][0] == "struct_size":
+            self.struct_size = ctypes.sizeof(self)
 
     def __setattr__(self, name: str, value: Any) -> None:
         """As usual; a value of the wrong type is an error that names the field."""
@@ -85,6 +86,26 @@ def switch(raw: str) -> Any:
 
     def write(record: Any, value: Any) -> None:
         setattr(record, raw, 0 if value is None else 1 if value else 2)
+
+    return property(read, write)
+
+
+def corrections(raw: str, kind: type[Any]) -> Any:
+    """How many corrections a step gets: a record of `kind`, the name of a mode, or a count (0: as recommended)."""
+    field = raw.removeprefix("_")
+
+    def read(record: Any) -> Any:
+        return getattr(record, raw)
+
+    def write(record: Any, value: Any) -> None:
+        if isinstance(value, str):
+            value = kind(mode=value)
+        elif not isinstance(value, kind):
+            count = operator.index(value)
+            if not 0 <= count <= 64:
+                raise ValueError(f"{field} is {count}; give 1 to 64, 0 for as many as the bundle recommends, or 'none'")
+            value = kind(mode="count", count=count) if count else kind()
+        setattr(record, raw, value)
 
     return property(read, write)
 

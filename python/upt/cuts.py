@@ -129,7 +129,7 @@ class Cuts:
             address(changed),
             len(changed),
         )
-        check(lib.upt_scene_surface(self._handle, *places))
+        check(lib.upt_scene_read_surface(self._handle, *places))
         self._vertex_count = len(rest)
         return Surface(rest, triangles, inside, changed, now.first_vertex, bool(now.is_new))
 
@@ -140,13 +140,13 @@ class Cuts:
             upt.StateError: the body has changed since; ask for its `surface` first.
         """
         places = output(out, self._vertex_count)
-        check(lib.upt_scene_surface_positions(self._handle, address(places), places.size))
+        check(lib.upt_scene_read_surface_positions(self._handle, address(places), places.size))
         return places
 
     def _fit(self) -> None:
         """The scene may have other nodes now."""
         count = c_uint64()
-        check(lib.upt_scene_node_count(self._handle, byref(count)))
+        check(lib.upt_scene_read_node_count(self._handle, byref(count)))
         self._resize(count.value)
 
     def _resize(self, node_count: int) -> None:

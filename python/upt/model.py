@@ -45,9 +45,9 @@ class Model:
             raise TypeError(f"path is {path!r}, expected the folder of a bundle: a str or a path")
         handle = ctypes.c_void_p()
         fields = ModelOptions(**options)
-        check(lib.upt_model_open(os.fsencode(path), ctypes.byref(fields), ctypes.byref(handle)))
+        check(lib.upt_model_create(os.fsencode(path), ctypes.byref(fields), ctypes.byref(handle)))
         self._handle = handle.value
-        self._close = weakref.finalize(self, lib.upt_model_close, handle.value)
+        self._close = weakref.finalize(self, lib.upt_model_destroy, handle.value)
 
     def scene(self, **options: Unpack[SceneOptionsKeywords]) -> Scene:
         """A new scene at rest; options are fields of `upt.SceneOptions`, for instance `kernel="native"`."""
@@ -57,7 +57,7 @@ class Model:
     def info(self) -> ModelInfo:
         """Sizes, step length, provider, memory: see `upt.ModelInfo`."""
         info = ModelInfo()
-        check(lib.upt_model_get_info(self._handle, ctypes.byref(info)))
+        check(lib.upt_model_read_info(self._handle, ctypes.byref(info)))
         return info
 
     @property
@@ -84,7 +84,7 @@ class Model:
     def positions(self) -> Floats:
         """Rest positions `[K, 3]` float32, mm; read-only."""
         out = np.empty((self.node_count, 3), np.float32)
-        check(lib.upt_model_positions(self._handle, address(out), out.size))
+        check(lib.upt_model_read_positions(self._handle, address(out), out.size))
         out.flags.writeable = False
         return out
 
@@ -93,20 +93,20 @@ class Model:
         if not isinstance(which, int):
             raise TypeError(f"which is {which!r}, expected an upt.IndexSet")
         needed = ctypes.c_uint64()
-        check(lib.upt_model_indices(self._handle, which, None, 0, ctypes.byref(needed)))
+        check(lib.upt_model_read_indices(self._handle, which, None, 0, ctypes.byref(needed)))
         out = np.empty(needed.value, np.uint32)
-        check(lib.upt_model_indices(self._handle, which, address(out), out.size, None))
+        check(lib.upt_model_read_indices(self._handle, which, address(out), out.size, None))
         return out
 
     @cached_property
     def supports(self) -> dict[str, Indices]:
         """The bundle's support groups, in order: by name their nodes, `[n]` uint32; `Loads.supports` moves them."""
-        return self._named("supports", lib.upt_model_support)
+        return self._named("supports", lib.upt_model_read_support)
 
     @cached_property
     def regions(self) -> dict[str, Indices]:
         """The named regions of the surface: by name their nodes, `[n]` uint32; `Loads.pressures` takes them."""
-        return self._named("regions", lib.upt_model_region)
+        return self._named("regions", lib.upt_model_read_region)
 
     def _named(self, what: str, read: Callable[..., int]) -> dict[str, Indices]:
         found: dict[str, Indices] = {}

@@ -20,7 +20,7 @@ from upt.model import Model
 from upt.scene import Scene
 
 _VERSION = 1
-_OPTIONS = ("step_s", "damping_per_s", "corrections", "corrections_target_mm", "substeps")
+_OPTIONS = ("step_s", "damping_per_s", "corrections", "substeps")
 
 
 class Recorder:
@@ -37,8 +37,8 @@ class Recorder:
         model: what the scene is made of.
         path: the file, which is written over.
         every: after how many steps the hash of all displacements is written, 1 or more.
-        options: fields of `upt.SceneOptions` that a replay can hold: step_s, damping_per_s, corrections,
-            corrections_target_mm, substeps.
+        options: fields of `upt.SceneOptions` that a replay can hold: step_s, damping_per_s, corrections (without
+            a budget, which counts by the clock), substeps.
     """
 
     def __init__(self, model: Model, path: str | os.PathLike[str], *, every: int = 1, **options: Any) -> None:
@@ -47,15 +47,29 @@ class Recorder:
         for name in options:
             if name not in _OPTIONS:
                 raise TypeError(f"a replay cannot hold the option {name!r}; it can hold {', '.join(_OPTIONS)}")
+        fields = SceneOptions(**options)
+        corrections = fields.corrections
+        if corrections.budget_us:
+            raise ValueError(
+                "corrections: a replay cannot hold a budget, which counts by the clock; give a target or a count"
+            )
         self.scene: Scene = model.scene(**options)
         described = model.describe()
-        fields = SceneOptions(**options)
         header = {
             "upt_replay": _VERSION,
             "bundle": described["name"],
             "bundle_sha256": described["bundle_sha256"],
             "portable": str(described["instruction_set"]).startswith("Portable"),
-            "scene": {name: getattr(fields, name) for name in _OPTIONS},
+            "scene": {
+                "step_s": fields.step_s,
+                "damping_per_s": fields.damping_per_s,
+                "corrections": {
+                    "mode": corrections.mode.name.lower(),
+                    "count": corrections.count,
+                    "target_mm": corrections.target_mm,
+                },
+                "substeps": fields.substeps,
+            },
         }
         self._every, self._steps, self._lines = every, 0, 0
         self._file = open(path, "w", encoding="utf-8")

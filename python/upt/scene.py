@@ -17,7 +17,16 @@ from numpy.typing import ArrayLike
 from upt._arrays import Floats, Indices, Outputs, address, indices, number, vectors
 from upt._input import Inputs
 from upt._library import check, lib
-from upt._native import InstrumentContact, InstrumentReading, SceneOptions, SceneStats, Status, View, ViewKind
+from upt._native import (
+    InstrumentContact,
+    InstrumentReading,
+    SceneOptions,
+    SceneStats,
+    SceneTiming,
+    Status,
+    View,
+    ViewKind,
+)
 from upt.cuts import Cuts
 from upt.instrument import Instrument, records
 from upt.loads import Loads
@@ -138,7 +147,7 @@ class Scene(Cuts, Ties):
         """
         found = [InstrumentReading() for _ in range(self._instrument_count)]
         array = (InstrumentReading * len(found))(*found)
-        check(lib.upt_scene_instrument_readings(self._handle, array if found else None, len(found)))
+        check(lib.upt_scene_read_instruments(self._handle, array if found else None, len(found)))
         return list(array)
 
     def instrument_contacts(self) -> list[InstrumentContact]:
@@ -147,7 +156,7 @@ class Scene(Cuts, Ties):
         Ascending by instrument: its place in the list, position (mm), force on it (mN).
         """
         needed = ctypes.c_uint64()
-        find = lib.upt_scene_instrument_contacts
+        find = lib.upt_scene_read_instrument_contacts
         check(find(self._handle, None, 0, ctypes.byref(needed)))
         array = (InstrumentContact * needed.value)()
         if needed.value:
@@ -175,7 +184,7 @@ class Scene(Cuts, Ties):
     def contact_force(self, out: Floats | None = None) -> Floats:
         """The reaction on the instrument at the last step's contact nodes, in their order: `[m, 3]`, mN."""
         result, place, length, _ = self._others.place(out, self.stats.contact_count)
-        check(lib.upt_scene_contact_force(self._handle, place, length))
+        check(lib.upt_scene_read_contact_force(self._handle, place, length))
         return result
 
     def read(self, out: Floats | None = None) -> Floats:
@@ -291,10 +300,17 @@ class Scene(Cuts, Ties):
 
     @property
     def stats(self) -> SceneStats:
-        """What the last step did and cost; works while a step is in flight."""
+        """What the last step did; works while a step is in flight."""
         stats = SceneStats()
-        check(lib.upt_scene_get_stats(self._handle, ctypes.byref(stats)))
+        check(lib.upt_scene_read_stats(self._handle, ctypes.byref(stats)))
         return stats
+
+    @property
+    def timing(self) -> SceneTiming:
+        """What the last step and its stages took, ms."""
+        timing = SceneTiming()
+        check(lib.upt_scene_read_timing(self._handle, ctypes.byref(timing)))
+        return timing
 
     def save(self) -> bytes:
         """A snapshot; `restore` resumes from it to the bit."""

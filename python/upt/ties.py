@@ -156,5 +156,5 @@ class Ties:
         """What each tie of the last step does: force on the tissue (mN), length (mm), `broken`, `broke` (in it)."""
         found = [_native.TieReading() for _ in range(self._tie_count)]
         array = (_native.TieReading * len(found))(*found)
-        check(lib.upt_scene_tie_readings(self._handle, array if found else None, len(found)))
+        check(lib.upt_scene_read_ties(self._handle, array if found else None, len(found)))
         return list(array)

@@ -150,8 +150,8 @@ pub(super) fn flag(field: &str, value: u8) -> Result<bool, Failure> {
 }
 
 /// `UPT_SWITCH_*`, of which the default is on.
-pub(super) fn switch(field: &str, value: u8) -> Result<bool, Failure> {
-    match i32::from(value) {
+pub(super) fn switch(field: &str, value: upt_switch) -> Result<bool, Failure> {
+    match value {
         UPT_SWITCH_DEFAULT | UPT_SWITCH_ON => Ok(true),
         UPT_SWITCH_OFF => Ok(false),
         _ => fail(
@@ -228,33 +228,47 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
     })
 }
 
-fn corrections(raw: &upt_scene_options) -> Result<Corrections, Failure> {
-    let target = raw.corrections_target_mm != 0.0;
-    let limited = raw.corrections_budget_us != 0 || target;
+fn corrections(raw: &upt_corrections) -> Result<Corrections, Failure> {
+    let upt_corrections {
+        mode,
+        count,
+        budget_us,
+        target_mm,
+    } = *raw;
+    let refused = |why: String| fail(UPT_ERR_ARGUMENT, why);
     let until = |most| Corrections::Auto {
         most,
-        target_mm: raw.corrections_target_mm,
-        budget_us: raw.corrections_budget_us,
+        target_mm,
+        budget_us,
     };
-    match raw.corrections {
-        UPT_CORRECTIONS_AUTO => Ok(until(MOST_CORRECTIONS)),
-        count @ 1.. if limited => Ok(until(count as u32)),
-        0 if limited && !target => Ok(Corrections::RecommendedWithin {
-            budget_us: raw.corrections_budget_us,
-        }),
-        0 if limited => fail(
-            UPT_ERR_ARGUMENT,
-            "corrections_target_mm is for UPT_CORRECTIONS_AUTO and for counts from 1; with corrections 0 the bundle's own target counts",
-        ),
-        UPT_CORRECTIONS_NONE if limited => fail(
-            UPT_ERR_ARGUMENT,
-            "corrections_budget_us and corrections_target_mm limit corrections, and UPT_CORRECTIONS_NONE makes none",
-        ),
-        0 => Ok(Corrections::Recommended),
-        UPT_CORRECTIONS_NONE => Ok(Corrections::None),
-        count @ 1.. => Ok(Corrections::Fixed(count as u32)),
-        value => unknown("corrections", value),
+    if mode != UPT_CORRECTIONS_COUNT && count != 0 {
+        return refused(format!(
+            "corrections.count is {count}, and corrections.mode is not UPT_CORRECTIONS_COUNT; set both, or leave the count at 0"
+        ));
     }
+    Ok(match mode {
+        UPT_CORRECTIONS_RECOMMENDED if target_mm != 0.0 => {
+            return refused(
+                "corrections.target_mm is for UPT_CORRECTIONS_COUNT and UPT_CORRECTIONS_AUTO; with UPT_CORRECTIONS_RECOMMENDED the bundle's own target counts"
+                    .into(),
+            );
+        }
+        UPT_CORRECTIONS_RECOMMENDED if budget_us != 0 => {
+            Corrections::RecommendedWithin { budget_us }
+        }
+        UPT_CORRECTIONS_RECOMMENDED => Corrections::Recommended,
+        UPT_CORRECTIONS_NONE if budget_us != 0 || target_mm != 0.0 => {
+            return refused(
+                "corrections.budget_us and corrections.target_mm limit corrections, and UPT_CORRECTIONS_NONE makes none"
+                    .into(),
+            );
+        }
+        UPT_CORRECTIONS_NONE => Corrections::None,
+        UPT_CORRECTIONS_COUNT if budget_us != 0 || target_mm != 0.0 => until(count),
+        UPT_CORRECTIONS_COUNT => Corrections::Fixed(count),
+        UPT_CORRECTIONS_AUTO => until(MOST_CORRECTIONS),
+        value => return unknown("corrections.mode", value),
+    })
 }
 
 pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptions, Failure> {
@@ -267,13 +281,13 @@ pub(super) unsafe fn scene_options(raw: &upt_scene_options) -> Result<SceneOptio
         guard_policy: guard_policy(raw.guard_policy)?,
         // SAFETY: NULL or a C string, as the header asks.
         mesh_path: unsafe { optional_path(raw.mesh_path, "mesh_path") }?,
-        free_boundary: flag("free_boundary", raw.free_boundary)?,
+        boundary: switch("boundary", raw.boundary)?,
         sleep: switch("sleep", raw.sleep)?,
         check_inversion: flag("check_inversion", raw.check_inversion)?,
         latest_wins: flag("latest_wins", raw.latest_wins)?,
         cubic_sampling: flag("cubic_sampling", raw.cubic_sampling)?,
         interpolate_points: flag("interpolate_points", raw.interpolate_points)?,
-        corrections: corrections(raw)?,
+        corrections: corrections(&raw.corrections)?,
         error_limit_mm: raw.error_limit_mm,
         step_s: raw.step_s,
         substeps: raw.substeps.into(),

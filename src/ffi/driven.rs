@@ -20,12 +20,12 @@ use ::contact::{Body, Shape};
 /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
 /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of instruments.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_instrument_readings(
+pub unsafe extern "C" fn upt_scene_read_instruments(
     scene: *mut upt_scene,
     out: *mut upt_instrument_reading,
     count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_instrument_readings", scene, |scene| {
+    call_scene("upt_scene_read_instruments", scene, |scene| {
         features::instruments()?;
         scene.with_contact_report(|report| {
             let have = report.readings.len() as u64;
@@ -65,13 +65,13 @@ pub unsafe extern "C" fn upt_scene_instrument_readings(
 /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
 /// `UPT_ERR_ARGUMENT` if capacity is too small.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_instrument_contacts(
+pub unsafe extern "C" fn upt_scene_read_instrument_contacts(
     scene: *mut upt_scene,
     out: *mut upt_instrument_contact,
     capacity: u64,
     needed: *mut u64,
 ) -> upt_status {
-    call_scene("upt_scene_instrument_contacts", scene, |scene| {
+    call_scene("upt_scene_read_instrument_contacts", scene, |scene| {
         if let Err(error) = features::instruments() {
             // SAFETY: `out` has room for `capacity` elements and `needed` is NULL or writable, as the header asks.
             let _ = unsafe { copy_out::<upt_instrument_contact>(&[], out, capacity, needed) };

@@ -89,14 +89,14 @@ pub unsafe extern "C" fn upt_host_file(name: *const c_char, bytes: usize) -> *mu
     room
 }
 
-/// Opens the bundle of the files that were written since the last opening, as `upt_model_open` opens one in a folder.
+/// Opens the bundle of the files that were written since the last opening, as `upt_model_create` opens one in a folder.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_host_open(
     options: *const upt_model_options,
     out: *mut *mut upt_model,
 ) -> upt_status {
     call(
-        "upt_model_open",
+        "upt_model_create",
         || (),
         || {
             let files = std::mem::take(&mut *FILES.lock().unwrap_or_else(PoisonError::into_inner));

@@ -111,12 +111,12 @@ unsafe fn read_instruments(
 /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`,
 /// `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; `UPT_ERR_UNSUPPORTED` also for a cut body.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_contact_force(
+pub unsafe extern "C" fn upt_scene_read_contact_force(
     scene: *mut upt_scene,
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_contact_force", scene, |scene| {
+    call_scene("upt_scene_read_contact_force", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
         let out = unsafe { output(out, out_count, "out") }?;
         features::instruments()?;

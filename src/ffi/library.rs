@@ -94,7 +94,7 @@ pub extern "C" fn upt_status_name(status: upt_status) -> *const c_char {
 pub unsafe extern "C" fn upt_set_log(
     callback: upt_log_fn,
     user: *mut c_void,
-    level: i32,
+    level: upt_log_level,
 ) -> upt_status {
     call(
         "upt_set_log",

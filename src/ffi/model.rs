@@ -20,13 +20,13 @@ use crate::model::Model;
 /// Errors: `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_VERSION`, `UPT_ERR_RUNTIME`, `UPT_ERR_PROVIDER`,
 /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_model_open(
+pub unsafe extern "C" fn upt_model_create(
     path: *const c_char,
     options: *const upt_model_options,
     out: *mut *mut upt_model,
 ) -> upt_status {
     call(
-        "upt_model_open",
+        "upt_model_create",
         || (),
         || {
             // SAFETY: the header asks for a place to write.
@@ -48,9 +48,9 @@ pub unsafe extern "C" fn upt_model_open(
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was closed before).
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_model_close(model: *mut upt_model) -> upt_status {
+pub unsafe extern "C" fn upt_model_destroy(model: *mut upt_model) -> upt_status {
     call(
-        "upt_model_close",
+        "upt_model_destroy",
         || (),
         || {
             drop(remove_model(model)?);
@@ -64,12 +64,12 @@ pub unsafe extern "C" fn upt_model_close(model: *mut upt_model) -> upt_status {
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_model_get_info(
+pub unsafe extern "C" fn upt_model_read_info(
     model: *const upt_model,
     out: *mut upt_model_info,
 ) -> upt_status {
     call(
-        "upt_model_get_info",
+        "upt_model_read_info",
         || (),
         || {
             let model = find_model(model)?;
@@ -132,13 +132,13 @@ pub unsafe extern "C" fn upt_model_describe(
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_model_positions(
+pub unsafe extern "C" fn upt_model_read_positions(
     model: *const upt_model,
     out: *mut f32,
     count: u64,
 ) -> upt_status {
     call(
-        "upt_model_positions",
+        "upt_model_read_positions",
         || (),
         || {
             let model = find_model(model)?;
@@ -169,15 +169,15 @@ pub unsafe extern "C" fn upt_model_positions(
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_model_indices(
+pub unsafe extern "C" fn upt_model_read_indices(
     model: *const upt_model,
-    set: i32,
+    set: upt_index_set,
     out: *mut u32,
     capacity: u64,
     needed: *mut u64,
 ) -> upt_status {
     call(
-        "upt_model_indices",
+        "upt_model_read_indices",
         || (),
         || {
             let model = find_model(model)?;
@@ -199,7 +199,7 @@ pub unsafe extern "C" fn upt_model_indices(
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such group, a capacity too small).
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_model_support(
+pub unsafe extern "C" fn upt_model_read_support(
     model: *const upt_model,
     group: u32,
     name: *mut c_char,
@@ -209,7 +209,7 @@ pub unsafe extern "C" fn upt_model_support(
     needed: *mut u64,
 ) -> upt_status {
     call(
-        "upt_model_support",
+        "upt_model_read_support",
         || (),
         || {
             let model = find_model(model)?;
@@ -232,7 +232,7 @@ pub unsafe extern "C" fn upt_model_support(
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such region, a capacity too small).
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_model_region(
+pub unsafe extern "C" fn upt_model_read_region(
     model: *const upt_model,
     region: u32,
     name: *mut c_char,
@@ -242,7 +242,7 @@ pub unsafe extern "C" fn upt_model_region(
     needed: *mut u64,
 ) -> upt_status {
     call(
-        "upt_model_region",
+        "upt_model_read_region",
         || (),
         || {
             let model = find_model(model)?;

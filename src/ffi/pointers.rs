@@ -38,6 +38,7 @@ sized!(
     upt_haptic_pose,
     upt_haptic_force,
     upt_scene_stats,
+    upt_scene_timing,
     upt_input,
     upt_pressure,
     upt_tie,

@@ -21,7 +21,7 @@ use crate::features;
 ///   those of the step. Neither `displacement` nor `time_s` may be set. NULL: nothing touches the tissue.
 /// - `when`: the moment on the clock of the steps' `time_s`, s, not before that of the last published step; for hosts whose steps have
 ///   no time, the time since the last published step. Velocities are followed for two steps at most.
-/// - `view`: the region, the attached points, or the vertices of the surface, `rest + out` of `upt_scene_surface`; NULL: the region.
+/// - `view`: the region, the attached points, or the vertices of the surface, `rest + out` of `upt_scene_read_surface`; NULL: the region.
 /// - `out`: `[n,3]`, mm, in the view's order.
 /// - `out_count`: number of floats in `out`, 3 n.
 ///

@@ -45,7 +45,7 @@ pub unsafe extern "C" fn upt_scene_create(
 }
 
 /// Destroys a scene, after waiting for a step in flight. A poisoned scene accepts only this call and
-/// `upt_scene_get_stats`.
+/// `upt_scene_read_stats`.
 ///
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
@@ -79,11 +79,11 @@ pub unsafe extern "C" fn upt_scene_reset(scene: *mut upt_scene) -> upt_status {
 /// Instruments are where they will be at the end of the step: each moves there on a straight line from its last pose, and their contact is
 /// solved. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with
 /// Coulomb friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
-/// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene remembers
+/// correction, as a load; with `UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene remembers
 /// each place of the array: pass every instrument every time, in the same order.
 ///
 /// - `input`: what drives the step; NULL: nothing does, the tissue moves on by itself.
-/// - `out`: `[n,3]`, mm (n: K, or the region's count; K of a cut body counts the copies of its nodes, `upt_scene_node_count`), may be NULL;
+/// - `out`: `[n,3]`, mm (n: K, or the region's count; K of a cut body counts the copies of its nodes, `upt_scene_read_node_count`), may be NULL;
 ///   it may be the memory of an input, at the cost of a copy.
 /// - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
 ///

@@ -1,4 +1,4 @@
-//! `upt_scene`: statistics and snapshots.
+//! `upt_scene`: statistics, times and snapshots.
 
 use std::sync::atomic::Ordering;
 
@@ -8,18 +8,18 @@ use super::registry::{call_scene, find_scene};
 use super::structs::*;
 use super::{output, pointers};
 
-/// Reports what the last step did and how long it took. Set `out->struct_size` first. Works while a step is in flight and
+/// Reports what the last step did. Set `out->struct_size` first. Works while a step is in flight and
 /// on a poisoned scene.
 ///
 /// Threads: any.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_get_stats(
+pub unsafe extern "C" fn upt_scene_read_stats(
     scene: *const upt_scene,
     out: *mut upt_scene_stats,
 ) -> upt_status {
     call(
-        "upt_scene_get_stats",
+        "upt_scene_read_stats",
         || (),
         || {
             let entry = find_scene(scene)?;
@@ -29,14 +29,6 @@ pub unsafe extern "C" fn upt_scene_get_stats(
                     struct_size,
                     flags: stats.flags,
                     step_count: stats.step_count,
-                    step_ms: stats.step_ms,
-                    check_ms: stats.check_ms,
-                    prior_ms: stats.prior_ms,
-                    encode_ms: stats.encode_ms,
-                    aggregate_ms: stats.aggregate_ms,
-                    latent_ms: stats.latent_ms,
-                    decode_ms: stats.decode_ms,
-                    guard_ms: stats.guard_ms,
                     decoded_node_count: stats.decoded_node_count,
                     contact_count: stats.contact_count,
                     memory_bytes: stats.memory_bytes,
@@ -51,16 +43,52 @@ pub unsafe extern "C" fn upt_scene_get_stats(
                     prior_forces: stats.prior_forces.into(),
                     substeps: stats.substeps as u8,
                     reserved: [0; 4],
-                    upload_ms: stats.upload_ms,
-                    download_ms: stats.download_ms,
                     step_path: stats.step_path as i32,
                     corrections: stats.corrections,
-                    corrections_ms: stats.corrections_ms,
                     evaluations: stats.evaluations,
                     residual: stats.residual,
                     error_mm: stats.error_mm,
                     min_det: stats.min_det,
+                })
+            };
+            // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
+            unsafe { output::fill(out, fill) }
+        },
+    )
+}
+
+/// Reports how long the last step and its stages took. Set `out->struct_size` first. Works as `upt_scene_read_stats` does.
+///
+/// Threads: any.
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn upt_scene_read_timing(
+    scene: *const upt_scene,
+    out: *mut upt_scene_timing,
+) -> upt_status {
+    call(
+        "upt_scene_read_timing",
+        || (),
+        || {
+            let entry = find_scene(scene)?;
+            let fill = |struct_size| {
+                let stats = entry.scene.stats();
+                Ok(upt_scene_timing {
+                    struct_size,
+                    reserved: [0; 4],
+                    step_count: stats.step_count,
+                    step_ms: stats.step_ms,
+                    check_ms: stats.check_ms,
+                    prior_ms: stats.prior_ms,
+                    encode_ms: stats.encode_ms,
+                    aggregate_ms: stats.aggregate_ms,
+                    latent_ms: stats.latent_ms,
+                    decode_ms: stats.decode_ms,
+                    guard_ms: stats.guard_ms,
+                    corrections_ms: stats.corrections_ms,
                     contact_ms: stats.contact_ms,
+                    upload_ms: stats.upload_ms,
+                    download_ms: stats.download_ms,
                 })
             };
             // SAFETY: `out` points to a struct whose first field is its size, as the header asks.

@@ -3,10 +3,10 @@
 use core::ptr::null;
 use safer_ffi::derive_ReprC;
 
+use super::constants::{upt_end, upt_mode, upt_shape, upt_view_kind};
 use super::support_structs::upt_support;
 
-/// The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
-/// by itself.
+/// The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: the tissue moves on by itself.
 ///
 /// One thing drives a step: `instruments`, the nodes in contact, or `collision`; two at once are `UPT_ERR_ARGUMENT`. Later versions add
 /// fields at the end.
@@ -139,7 +139,7 @@ pub struct upt_tie {
     /// `sizeof(upt_tie)`, the same in every element of an array.
     pub struct_size: u32,
     /// What it is tied to: `UPT_END_*`.
-    pub to: i32,
+    pub to: upt_end,
     /// The point of the tissue: nodes, of which one at least is free and near the domain, ...
     pub nodes: [u32; 3],
     /// ... and their weights, 0 or more, with the sum 1; all zero: the first node alone. `upt_scene_tie_points` finds both.
@@ -188,7 +188,7 @@ impl upt_tie {
     };
 }
 
-/// What a tie does at the end of a step; filled by `upt_scene_tie_readings`.
+/// What a tie does at the end of a step; filled by `upt_scene_read_ties`.
 #[derive_ReprC]
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -246,7 +246,7 @@ pub struct upt_view {
     /// `sizeof(upt_view)`.
     pub struct_size: u32,
     /// `UPT_VIEW_*`.
-    pub kind: i32,
+    pub kind: upt_view_kind,
 }
 
 /// For hosts in Rust.
@@ -278,7 +278,7 @@ pub struct upt_instrument {
     /// `sizeof(upt_instrument)`, the same in every element of an array.
     pub struct_size: u32,
     /// `UPT_SHAPE_*`.
-    pub shape: i32,
+    pub shape: upt_shape,
     /// Centre, mm, in the mesh's frame.
     pub position: [f32; 3],
     /// Unit quaternion x, y, z, w; all zero is no rotation.
@@ -290,7 +290,7 @@ pub struct upt_instrument {
     /// Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.
     pub sticking: u8,
     /// Only for `upt_input`: `UPT_MODE_*`.
-    pub mode: u8,
+    pub mode: upt_mode,
     /// Zero.
     pub reserved: [u8; 2],
     /// Only for `upt_input`: Coulomb's coefficient, 0 or more.
@@ -301,7 +301,7 @@ pub struct upt_instrument {
     pub hull: *const upt_hull,
 }
 
-/// What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.
+/// What the tissue does to an instrument at the end of a step; filled by `upt_scene_read_instruments`.
 #[derive_ReprC]
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -324,7 +324,7 @@ pub struct upt_instrument_reading {
     pub residual_mm: f32,
 }
 
-/// A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.
+/// A point of the surface that pushes or holds an instrument; filled by `upt_scene_read_instrument_contacts`.
 #[derive_ReprC]
 #[repr(C)]
 #[derive(Clone, Copy)]

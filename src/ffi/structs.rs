@@ -4,6 +4,10 @@
 use core::ffi::{c_char, c_void};
 use safer_ffi::derive_ReprC;
 
+use super::constants::{
+    upt_corrections_mode, upt_flag, upt_guard_policy, upt_kernel, upt_kind, upt_log_level,
+    upt_precision, upt_provider, upt_step_path, upt_switch,
+};
 use super::step_structs::upt_instrument;
 
 /// A bundle made ready to step. Immutable; any number of threads may use it at once.
@@ -25,7 +29,7 @@ pub struct upt_haptics {
 /// Receives log messages (UTF-8, valid during the call) on the host's threads, during their calls. It must not call
 /// the library: such a call returns `UPT_ERR_STATE`.
 pub type upt_log_fn =
-    Option<unsafe extern "C" fn(level: i32, message: *const c_char, user: *mut c_void)>;
+    Option<unsafe extern "C" fn(level: upt_log_level, message: *const c_char, user: *mut c_void)>;
 
 /// Options of `upt_init`.
 #[derive_ReprC]
@@ -40,7 +44,7 @@ pub struct upt_init_options {
     pub onnxruntime_path: *const c_char,
 }
 
-/// Options of `upt_model_open`.
+/// Options of `upt_model_create`.
 #[derive_ReprC]
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -50,13 +54,13 @@ pub struct upt_model_options {
     /// Threads that a step may use, the caller's included; 0: the default of `upt_init`.
     pub threads: u32,
     /// `UPT_PROVIDER_*` in order of preference; NULL: CPU.
-    pub providers: *const i32,
+    pub providers: *const upt_provider,
     /// Entries in `providers`.
     pub provider_count: u64,
     /// Device of GPU providers, from 0.
     pub device_id: i32,
     /// `UPT_PRECISION_*`.
-    pub precision: i32,
+    pub precision: upt_precision,
     /// Bytes; 0: no limit. Needs a GPU provider in `providers`.
     pub gpu_memory_limit: u64,
     /// Folder for compiled engines; NULL: they are not kept.
@@ -66,14 +70,14 @@ pub struct upt_model_options {
     /// 1: capture CUDA graphs.
     pub cuda_graph: u8,
     /// `UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`.
-    pub fallback: u8,
+    pub fallback: upt_switch,
     /// 1: the same bits on every processor, for replays and lockstep; steps take longer. Reduced bundles without a network.
     pub portable: u8,
     /// A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.
     pub user_stream: *mut c_void,
 }
 
-/// What a model is; filled by `upt_model_get_info`.
+/// What a model is; filled by `upt_model_read_info`.
 #[derive_ReprC]
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -81,7 +85,7 @@ pub struct upt_model_info {
     /// `sizeof(upt_model_info)`, set by the caller.
     pub struct_size: u32,
     /// `UPT_KIND_*`.
-    pub kind: i32,
+    pub kind: upt_kind,
     /// K, the nodes of the bundle's mesh.
     pub node_count: u64,
     /// Tetrahedra.
@@ -99,16 +103,31 @@ pub struct upt_model_info {
     /// Longest push that the model was trained on, mm.
     pub max_push_mm: f32,
     /// `UPT_PROVIDER_*` that runs the latent stage.
-    pub provider: i32,
+    pub provider: upt_provider,
     /// `UPT_PRECISION_*`.
-    pub precision: i32,
+    pub precision: upt_precision,
     /// Host memory of the model.
     pub memory_bytes: u64,
-    /// Wall time of `upt_model_open`.
+    /// Wall time of `upt_model_create`.
     pub load_seconds: f64,
     /// The `step_s` of `upt_scene_options` that the bundle recommends to a host that shows frames (`upt_scene_present`), seconds; `dt` where it
     /// recommends no other. For scenes with the corrections that the bundle recommends.
     pub frame_step_s: f64,
+}
+
+/// How many corrections by the elements a step gets while there is contact, in `upt_scene_options`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_corrections {
+    /// `UPT_CORRECTIONS_*`.
+    pub mode: upt_corrections_mode,
+    /// With `UPT_CORRECTIONS_COUNT` 1 to 64; otherwise 0.
+    pub count: u32,
+    /// No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
+    pub budget_us: u32,
+    /// Corrections stop once the estimated error is below this, mm; 0: no target. Only with `UPT_CORRECTIONS_COUNT` and `UPT_CORRECTIONS_AUTO`.
+    pub target_mm: f32,
 }
 
 /// Options of `upt_scene_create`.
@@ -121,17 +140,17 @@ pub struct upt_scene_options {
     /// Threads of a step; 0: the model's.
     pub threads: u32,
     /// `UPT_KERNEL_*`: who decodes.
-    pub kernel: i32,
+    pub kernel: upt_kernel,
     /// `UPT_PRECISION_*` of the native decoder; 0: the model's; `UPT_PRECISION_FORCE_F32`: float32, whatever the model's is.
-    pub precision: i32,
+    pub precision: upt_precision,
     /// `UPT_GUARD_*`.
-    pub guard_policy: i32,
+    pub guard_policy: upt_guard_policy,
     /// A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's.
     pub mesh_path: *const c_char,
-    /// 1: do not enforce held and contact nodes.
-    pub free_boundary: u8,
+    /// `UPT_SWITCH_*`: held nodes and nodes in contact are where they belong, usually on; off: where the networks put them.
+    pub boundary: upt_switch,
     /// `UPT_SWITCH_*`: tissue at rest sleeps, usually on.
-    pub sleep: u8,
+    pub sleep: upt_switch,
     /// 1: the guard looks for inverted elements in each step.
     pub check_inversion: u8,
     /// 1: a submit while a step is in flight replaces the waiting contact and does not return `UPT_ERR_BUSY`.
@@ -146,14 +165,9 @@ pub struct upt_scene_options {
     /// Zero.
     pub reserved: [u8; 1],
     /// `UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.
-    pub step_path: i32,
-    /// Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-    /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets.
-    pub corrections: i32,
-    /// No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
-    pub corrections_budget_us: u32,
-    /// Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.
-    pub corrections_target_mm: f32,
+    pub step_path: upt_step_path,
+    /// Corrections by the elements while there is contact; all zero: as many as the bundle recommends.
+    pub corrections: upt_corrections,
     /// `UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never.
     pub error_limit_mm: f32,
     /// Length of a step, s: 0.01 to 0.05, or 0 for the bundle's. A length other than the bundle's needs corrections
@@ -184,7 +198,7 @@ pub struct upt_haptics_options {
     /// The most that the passivity controller damps, N s/m; 0: 5.
     pub damping_limit_n_s_per_m: f32,
     /// `UPT_SWITCH_*`: passivity observer and controller, usually on.
-    pub passivity: u8,
+    pub passivity: upt_switch,
     /// Zero.
     pub reserved: [u8; 7],
 }
@@ -245,7 +259,7 @@ pub struct upt_haptic_force {
     pub angular_stiffness_n_m_per_rad: [f32; 9],
 }
 
-/// What the last step did and cost; filled by `upt_scene_get_stats`.
+/// What the last step did; filled by `upt_scene_read_stats`.
 #[derive_ReprC]
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -253,8 +267,61 @@ pub struct upt_scene_stats {
     /// `sizeof(upt_scene_stats)`, set by the caller.
     pub struct_size: u32,
     /// `UPT_FLAG_*` of the last step.
-    pub flags: u32,
+    pub flags: upt_flag,
     /// Steps since creation or reset.
+    pub step_count: u64,
+    /// Nodes decoded in the last step.
+    pub decoded_node_count: u64,
+    /// Contact nodes of the last step.
+    pub contact_count: u64,
+    /// Bytes that the scene has allocated in addition to the model; pages that it has never touched are not resident.
+    pub memory_bytes: u64,
+    /// Threads of a step.
+    pub threads: u32,
+    /// `UPT_KERNEL_*` that decodes.
+    pub kernel: upt_kernel,
+    /// `UPT_PROVIDER_*` that runs the latent stage.
+    pub provider: upt_provider,
+    /// `UPT_PRECISION_*` of the decoder.
+    pub precision: upt_precision,
+    /// Largest displacement among the decoded nodes, mm.
+    pub max_displacement_mm: f32,
+    /// Largest ratio of push, rate of push, contact area and number of sites to what the model was trained on; above 1: outside.
+    pub indicator: f32,
+    /// 1: the scene sleeps.
+    pub sleeping: u8,
+    /// 1: a bug was caught in an earlier call; only destroy is left.
+    pub poisoned: u8,
+    /// 1: `upt_scene_read_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.
+    pub prior_forces: u8,
+    /// Substeps of the last step; 0 if it was not split.
+    pub substeps: u8,
+    /// Zero.
+    pub reserved: [u8; 4],
+    /// `UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.
+    pub step_path: upt_step_path,
+    /// Corrections made in the last step.
+    pub corrections: u32,
+    /// Evaluations of the element forces in the last step.
+    pub evaluations: u32,
+    /// Residual force after the corrections divided by that before them; 0 without corrections.
+    pub residual: f32,
+    /// Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
+    pub error_mm: f32,
+    /// Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither.
+    pub min_det: f32,
+}
+
+/// What the last step took, in milliseconds; filled by `upt_scene_read_timing`.
+#[derive_ReprC]
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct upt_scene_timing {
+    /// `sizeof(upt_scene_timing)`, set by the caller.
+    pub struct_size: u32,
+    /// Zero.
+    pub reserved: [u8; 4],
+    /// Steps since creation or reset, the last of which this is of: as in `upt_scene_stats`.
     pub step_count: u64,
     /// The whole step, ms; the stages follow.
     pub step_ms: f64,
@@ -272,52 +339,12 @@ pub struct upt_scene_stats {
     pub decode_ms: f64,
     /// Guard and publishing, ms.
     pub guard_ms: f64,
-    /// Nodes decoded in the last step.
-    pub decoded_node_count: u64,
-    /// Contact nodes of the last step.
-    pub contact_count: u64,
-    /// Bytes that the scene has allocated in addition to the model; pages that it has never touched are not resident.
-    pub memory_bytes: u64,
-    /// Threads of a step.
-    pub threads: u32,
-    /// `UPT_KERNEL_*` that decodes.
-    pub kernel: i32,
-    /// `UPT_PROVIDER_*` that runs the latent stage.
-    pub provider: i32,
-    /// `UPT_PRECISION_*` of the decoder.
-    pub precision: i32,
-    /// Largest displacement among the decoded nodes, mm.
-    pub max_displacement_mm: f32,
-    /// Largest ratio of push, rate of push, contact area and number of sites to what the model was trained on; above 1: outside.
-    pub indicator: f32,
-    /// 1: the scene sleeps.
-    pub sleeping: u8,
-    /// 1: a bug was caught in an earlier call; only destroy is left.
-    pub poisoned: u8,
-    /// 1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.
-    pub prior_forces: u8,
-    /// Substeps of the last step; 0 if it was not split.
-    pub substeps: u8,
-    /// Zero.
-    pub reserved: [u8; 4],
+    /// Corrections, ms.
+    pub corrections_ms: f64,
+    /// Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections.
+    pub contact_ms: f64,
     /// Part of the stages' times: copies to a device, ms; 0 on the CPU.
     pub upload_ms: f64,
     /// Part of the stages' times: copies back from a device, ms; 0 on the CPU.
     pub download_ms: f64,
-    /// `UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.
-    pub step_path: i32,
-    /// Corrections made in the last step.
-    pub corrections: u32,
-    /// Corrections, ms.
-    pub corrections_ms: f64,
-    /// Evaluations of the element forces in the last step.
-    pub evaluations: u32,
-    /// Residual force after the corrections divided by that before them; 0 without corrections.
-    pub residual: f32,
-    /// Estimated root mean square error of the corrected state over all nodes, mm; 0 without corrections.
-    pub error_mm: f32,
-    /// Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither.
-    pub min_det: f32,
-    /// Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections.
-    pub contact_ms: f64,
 }

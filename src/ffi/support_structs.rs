@@ -3,7 +3,7 @@
 use core::ptr::null;
 use safer_ffi::derive_ReprC;
 
-/// What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_support` names the groups.
+/// What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_read_support` names the groups.
 #[derive_ReprC]
 #[repr(C)]
 #[derive(Clone, Copy)]

@@ -14,8 +14,11 @@ use crate::output::Output;
 /// Threads: any, at any time, even while a step runs.
 /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` for a place that is not aligned, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_node_count(scene: *mut upt_scene, out: *mut u64) -> upt_status {
-    call_scene("upt_scene_node_count", scene, |scene| {
+pub unsafe extern "C" fn upt_scene_read_node_count(
+    scene: *mut upt_scene,
+    out: *mut u64,
+) -> upt_status {
+    call_scene("upt_scene_read_node_count", scene, |scene| {
         // SAFETY: the host passes a place to write to, as the header asks.
         unsafe { place(out, "out") }?.set(scene.node_count() as u64);
         Ok(UPT_OK)
@@ -26,7 +29,7 @@ pub unsafe extern "C" fn upt_scene_node_count(scene: *mut upt_scene, out: *mut u
 /// bare. Tells what has changed since the last call. Where the body has not changed since, it does nothing, so it may be called in every frame.
 ///
 /// Vertices and slots of triangles keep their numbers, so that a renderer uploads the vertices from `first_vertex` on and the slots that
-/// `upt_scene_surface` lists, unless `is_new` is 1. The first vertices are the nodes of the mesh, also those inside, which no triangle has;
+/// `upt_scene_read_surface` lists, unless `is_new` is 1. The first vertices are the nodes of the mesh, also those inside, which no triangle has;
 /// vertices that nothing uses any more stay. Works on an intact body, too.
 ///
 /// - `out`: counts; set `struct_size`.
@@ -67,7 +70,7 @@ pub unsafe extern "C" fn upt_scene_update_surface(
 /// Errors: `UPT_ERR_STATE` before the first update, `UPT_ERR_ARGUMENT` for other counts and an array that is not aligned, `UPT_ERR_HANDLE`,
 /// `UPT_ERR_NULL` for the scene, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_surface(
+pub unsafe extern "C" fn upt_scene_read_surface(
     scene: *mut upt_scene,
     rest: *mut f32,
     vertex_count: u64,
@@ -77,7 +80,7 @@ pub unsafe extern "C" fn upt_scene_surface(
     changed: *mut u32,
     changed_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_surface", scene, |scene| {
+    call_scene("upt_scene_read_surface", scene, |scene| {
         scene.with_surface(|surface| {
             let faces = surface.triangles.len();
             check(
@@ -125,12 +128,12 @@ pub unsafe extern "C" fn upt_scene_surface(
 /// Errors: `UPT_ERR_STATE` where the body has changed since the last `upt_scene_update_surface`, `UPT_ERR_ARGUMENT`, `UPT_ERR_UNSUPPORTED` for a scene
 /// with a region, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_surface_positions(
+pub unsafe extern "C" fn upt_scene_read_surface_positions(
     scene: *mut upt_scene,
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_surface_positions", scene, |scene| {
+    call_scene("upt_scene_read_surface_positions", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
         scene.surface_positions_to(unsafe { output(out, out_count, "out") }?)?;
         Ok(UPT_OK)

@@ -24,12 +24,12 @@ const MOST_POINTS: u64 = 1_000_000;
 /// Errors: `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_NULL`, `UPT_ERR_HANDLE`,
 /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of ties.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn upt_scene_tie_readings(
+pub unsafe extern "C" fn upt_scene_read_ties(
     scene: *mut upt_scene,
     out: *mut upt_tie_reading,
     count: u64,
 ) -> upt_status {
-    call_scene("upt_scene_tie_readings", scene, |scene| {
+    call_scene("upt_scene_read_ties", scene, |scene| {
         features::instruments()?;
         scene.with_contact_report(|report| {
             let have = report.ties.len() as u64;

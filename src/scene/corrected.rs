@@ -54,7 +54,7 @@ impl Corrector {
         let (most, target_mm, budget_us) = match options.corrections {
             Corrections::None => return none(own, options.substeps),
             Corrections::Recommended | Corrections::RecommendedWithin { .. } => match entry {
-                Some(entry) if entry.recommended > 0 && !options.free_boundary => {
+                Some(entry) if entry.recommended > 0 && options.boundary => {
                     let budget_us = match options.corrections {
                         Corrections::RecommendedWithin { budget_us } => budget_us,
                         _ => 0,
@@ -116,9 +116,9 @@ impl Corrector {
                 options.error_limit_mm
             )));
         }
-        if options.free_boundary {
+        if !options.boundary {
             return Err(Error::Unsupported(
-                "corrections: the equation of motion needs the boundary; leave `free_boundary` off"
+                "corrections: the equation of motion needs the boundary; leave `boundary` on"
                     .into(),
             ));
         }

@@ -122,7 +122,7 @@ impl Published {
         let want = 3 * self.count(view);
         if view == View::Surface {
             return Err(Error::Unsupported(
-                "the surface of a state is upt_scene_surface_positions; only frames between steps have it as a view".into(),
+                "the surface of a state is upt_scene_read_surface_positions; only frames between steps have it as a view".into(),
             ));
         }
         if view == View::Points && want == 0 {

@@ -115,7 +115,7 @@ impl Core {
         }
         if kept {
             field.copy_from_slice(&frame.field);
-        } else if !self.options.free_boundary {
+        } else if self.options.boundary {
             enforce(&self.mesh.held_nodes, &self.held, contact, field);
         }
         Ok(())

@@ -17,7 +17,7 @@ use crate::stats::{SceneStats, flag};
 impl Core {
     /// Held nodes to zero, contact nodes to what is imposed; a held node stays held in contact.
     pub(super) fn enforce_next(&mut self) {
-        if !self.options.free_boundary {
+        if self.options.boundary {
             enforce(
                 &self.mesh.held_nodes,
                 &self.held,

@@ -55,14 +55,14 @@ impl World<'_> {
                     }
                     let count = (call.seed % 3).min(out.len() as u64);
                     let place = pointer_mut(&mut out, call, 0);
-                    let status = upt_scene_instrument_readings(scene, place, count);
+                    let status = upt_scene_read_instruments(scene, place, count);
                     if status == UPT_OK {
                         let felt = out
                             .iter()
                             .flat_map(|one| one.force.into_iter().chain(one.torque));
                         assert!(felt.into_iter().all(f32::is_finite));
                     }
-                    ("upt_scene_instrument_readings", status)
+                    ("upt_scene_read_instruments", status)
                 }
                 Function::InstrumentContacts => {
                     let mut out = [std::mem::zeroed::<upt_instrument_contact>(); 64];
@@ -73,8 +73,9 @@ impl World<'_> {
                     };
                     let mut needed = 0;
                     let place = pointer_mut(&mut out, call, 0);
-                    let status = upt_scene_instrument_contacts(scene, place, capacity, &mut needed);
-                    ("upt_scene_instrument_contacts", status)
+                    let status =
+                        upt_scene_read_instrument_contacts(scene, place, capacity, &mut needed);
+                    ("upt_scene_read_instrument_contacts", status)
                 }
                 Function::HullCreate => {
                     let mut points = [

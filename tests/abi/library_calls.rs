@@ -9,7 +9,7 @@ use super::inputs::*;
 use super::{Call, Function, Odd, Size, World};
 use crate::fixture;
 
-/// `upt_model_support` and `upt_model_region`.
+/// `upt_model_read_support` and `upt_model_read_region`.
 type Named =
     unsafe extern "C" fn(*const upt_model, u32, *mut c_char, u64, *mut u32, u64, *mut u64) -> i32;
 
@@ -59,20 +59,20 @@ impl World<'_> {
                     );
                     ("upt_providers", status)
                 }
-                Function::ModelOpen => ("upt_model_open", self.model_open(call)),
+                Function::ModelOpen => ("upt_model_create", self.model_open(call)),
                 Function::ModelClose => {
-                    let status = upt_model_close(model);
+                    let status = upt_model_destroy(model);
                     if status == UPT_OK {
                         self.models.retain(|entry| entry.0 != model);
                         self.closed_models.push(model);
                     }
-                    ("upt_model_close", status)
+                    ("upt_model_destroy", status)
                 }
                 Function::ModelInfo => {
                     let mut info: upt_model_info = std::mem::zeroed();
                     info.struct_size = sized::<upt_model_info>(call);
                     let out = pointer_mut(std::slice::from_mut(&mut info), call, 0);
-                    ("upt_model_get_info", upt_model_get_info(model, out))
+                    ("upt_model_read_info", upt_model_read_info(model, out))
                 }
                 Function::ModelDescribe => {
                     let mut text = vec![0 as c_char; 1 << 16];
@@ -88,9 +88,9 @@ impl World<'_> {
                 }
                 Function::ModelPositions => {
                     let status = Self::output(call, 0, 3 * model_nodes, true, |out, count| {
-                        upt_model_positions(model, out, count)
+                        upt_model_read_positions(model, out, count)
                     });
-                    ("upt_model_positions", status)
+                    ("upt_model_read_positions", status)
                 }
                 Function::ModelIndices => {
                     let mut out = vec![0u32; 1 << 15];
@@ -98,14 +98,14 @@ impl World<'_> {
                     let (capacity, _) = count(out.len() - 1, call.size);
                     let capacity = capacity.min(out.len() as u64);
                     let mut needed = 0u64;
-                    let status = upt_model_indices(
+                    let status = upt_model_read_indices(
                         model,
                         set,
                         pointer_mut(&mut out, call, 0),
                         capacity,
                         pointer_mut(std::slice::from_mut(&mut needed), call, 1),
                     );
-                    ("upt_model_indices", status)
+                    ("upt_model_read_indices", status)
                 }
                 Function::ModelSupport | Function::ModelRegion => {
                     let mut name = [0 as std::ffi::c_char; 32];
@@ -117,8 +117,8 @@ impl World<'_> {
                     };
                     let (capacity, _) = count(nodes.len() - 1, call.size);
                     let (named, ask): (_, Named) = match call.function {
-                        Function::ModelRegion => ("upt_model_region", upt_model_region),
-                        _ => ("upt_model_support", upt_model_support),
+                        Function::ModelRegion => ("upt_model_read_region", upt_model_read_region),
+                        _ => ("upt_model_read_support", upt_model_read_support),
                     };
                     let status = ask(
                         model,

@@ -136,20 +136,26 @@ impl World<'_> {
                 Function::ContactForce => {
                     let mut stats: upt_scene_stats = std::mem::zeroed();
                     stats.struct_size = size_of::<upt_scene_stats>() as u32;
-                    upt_scene_get_stats(scene, &mut stats);
+                    upt_scene_read_stats(scene, &mut stats);
                     let contacts = stats.contact_count as usize;
                     let status = Self::output(call, 0, 3 * contacts, false, |out, count| {
-                        upt_scene_contact_force(scene, out, count)
+                        upt_scene_read_contact_force(scene, out, count)
                     });
-                    ("upt_scene_contact_force", status)
+                    ("upt_scene_read_contact_force", status)
                 }
                 Function::Stats => {
                     let mut stats: upt_scene_stats = std::mem::zeroed();
                     stats.struct_size = sized::<upt_scene_stats>(call);
                     let out = pointer_mut(std::slice::from_mut(&mut stats), call, 0);
-                    let status = upt_scene_get_stats(scene, out);
+                    let status = upt_scene_read_stats(scene, out);
                     assert_eq!(stats.poisoned, 0, "a bug poisoned the scene");
-                    ("upt_scene_get_stats", status)
+                    ("upt_scene_read_stats", status)
+                }
+                Function::Timing => {
+                    let mut timing: upt_scene_timing = std::mem::zeroed();
+                    timing.struct_size = sized::<upt_scene_timing>(call);
+                    let out = pointer_mut(std::slice::from_mut(&mut timing), call, 0);
+                    ("upt_scene_read_timing", upt_scene_read_timing(scene, out))
                 }
                 Function::Save => {
                     let mut bytes = vec![0u8; 1 << 20];

@@ -15,9 +15,9 @@ impl World<'_> {
             Function::NodeCount => {
                 let mut nodes = [0u64];
                 let status =
-                    unsafe { upt_scene_node_count(scene, pointer_mut(&mut nodes, call, 0)) };
+                    unsafe { upt_scene_read_node_count(scene, pointer_mut(&mut nodes, call, 0)) };
                 assert_eq!(status == UPT_OK, nodes[0] > 0);
-                ("upt_scene_node_count", status)
+                ("upt_scene_read_node_count", status)
             }
             Function::UpdateSurface => {
                 let mut out: [upt_surface; 1] = [unsafe { std::mem::zeroed() }];
@@ -39,7 +39,7 @@ impl World<'_> {
                 let mut changed = vec![0u32; changes + 8];
                 let triangles = count(triangles, call.size).0;
                 let status = unsafe {
-                    upt_scene_surface(
+                    upt_scene_read_surface(
                         scene,
                         pointer_mut(&mut rest, call, 0),
                         rows,
@@ -52,14 +52,14 @@ impl World<'_> {
                 };
                 let is_untouched = rest.iter().all(|x| *x == UNTOUCHED);
                 assert!(status == UPT_OK || is_untouched && inside.iter().all(|flag| *flag == 7));
-                ("upt_scene_surface", status)
+                ("upt_scene_read_surface", status)
             }
             _ => {
                 let floats = 3 * Self::counts(scene)[0];
                 let status = Self::output(call, 0, floats, true, |place, count| unsafe {
-                    upt_scene_surface_positions(scene, place, count)
+                    upt_scene_read_surface_positions(scene, place, count)
                 });
-                ("upt_scene_surface_positions", status)
+                ("upt_scene_read_surface_positions", status)
             }
         }
     }

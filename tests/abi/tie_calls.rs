@@ -46,12 +46,12 @@ impl World<'_> {
                         one.struct_size = sized::<upt_tie_reading>(call);
                     }
                     let place = pointer_mut(&mut out, call, 0);
-                    let status = upt_scene_tie_readings(scene, place, call.seed % 5);
+                    let status = upt_scene_read_ties(scene, place, call.seed % 5);
                     if status == UPT_OK {
                         let felt = out.iter().flat_map(|one| one.force);
                         assert!(felt.into_iter().all(f32::is_finite));
                     }
-                    ("upt_scene_tie_readings", status)
+                    ("upt_scene_read_ties", status)
                 }
                 Function::TiePoints => {
                     let mut places = [10.0f32, 9.0, 12.0, 1.0, 2.0, 3.0];

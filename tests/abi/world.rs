@@ -68,7 +68,7 @@ impl<'a> World<'a> {
             assert_eq!(unsafe { upt_hull_destroy(hull) }, UPT_OK);
         }
         for (model, _) in self.models {
-            assert_eq!(unsafe { upt_model_close(model) }, UPT_OK);
+            assert_eq!(unsafe { upt_model_destroy(model) }, UPT_OK);
         }
     }
 
@@ -81,13 +81,13 @@ impl<'a> World<'a> {
         let path = CString::new(path).unwrap();
         let mut model = null_mut();
         let out = if no_out { null_mut() } else { &raw mut model };
-        let status = unsafe { upt_model_open(path.as_ptr(), options, out) };
+        let status = unsafe { upt_model_create(path.as_ptr(), options, out) };
         assert_eq!(status == UPT_OK, !model.is_null());
         if status == UPT_OK {
             let mut positions = 0;
             let mut info: upt_model_info = unsafe { std::mem::zeroed() };
             info.struct_size = size_of::<upt_model_info>() as u32;
-            assert_eq!(unsafe { upt_model_get_info(model, &mut info) }, UPT_OK);
+            assert_eq!(unsafe { upt_model_read_info(model, &mut info) }, UPT_OK);
             positions += info.node_count as usize;
             self.models.push((model, positions));
         }

@@ -116,9 +116,9 @@ int main(int argc, char **argv) {
   orphan = make_scene();
   closed = model;
   EXPECT(upt_shutdown(), UPT_ERR_STATE);
-  EXPECT(upt_model_close(NULL), UPT_ERR_NULL);
-  EXPECT(upt_model_close(model), UPT_OK);
-  EXPECT(upt_model_close(closed), UPT_ERR_HANDLE);
+  EXPECT(upt_model_destroy(NULL), UPT_ERR_NULL);
+  EXPECT(upt_model_destroy(model), UPT_OK);
+  EXPECT(upt_model_destroy(closed), UPT_ERR_HANDLE);
   EXPECT(upt_model_describe(closed, NULL, 0, NULL), UPT_ERR_HANDLE);
   EXPECT(upt_scene_step(orphan, NULL, NULL, 0), UPT_OK);
   EXPECT(upt_shutdown(), UPT_ERR_STATE);

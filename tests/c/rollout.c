@@ -31,18 +31,21 @@ int main(int argc, char **argv) {
   options.struct_size = sizeof options;
   options.sleep = UPT_SWITCH_OFF;
   options.guard_policy = UPT_GUARD_REPORT;
-  options.corrections = argc > 4 ? atoi(argv[4]) : 0;
+  if (argc > 4) {
+    options.corrections.mode = UPT_CORRECTIONS_COUNT;
+    options.corrections.count = (uint32_t)atoi(argv[4]);
+  }
   memset(&info, 0, sizeof info);
   info.struct_size = sizeof info;
-  EXPECT(upt_model_open(argv[1], NULL, &model), UPT_OK);
-  EXPECT(upt_model_get_info(model, &info), UPT_OK);
+  EXPECT(upt_model_create(argv[1], NULL, &model), UPT_OK);
+  EXPECT(upt_model_read_info(model, &info), UPT_OK);
   EXPECT(upt_scene_create(model, &options, &scene), UPT_OK);
   if (expect_failures > 0) {
     return expect_result("rollout");
   }
   domain = malloc(info.domain_node_count * sizeof *domain);
   out = malloc(3 * info.node_count * sizeof *out);
-  EXPECT(upt_model_indices(model, UPT_SET_DOMAIN_NODES, domain, info.domain_node_count, NULL),
+  EXPECT(upt_model_read_indices(model, UPT_SET_DOMAIN_NODES, domain, info.domain_node_count, NULL),
          UPT_OK);
   for (i = 0; i < PUSHED; i++) {
     nodes[i] = domain[i];
@@ -68,7 +71,7 @@ int main(int argc, char **argv) {
     EXPECT_TRUE(fclose(file) == 0);
   }
   upt_scene_destroy(scene);
-  upt_model_close(model);
+  upt_model_destroy(model);
   EXPECT(upt_shutdown(), UPT_OK);
   return expect_result("rollout");
 }

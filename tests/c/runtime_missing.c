@@ -25,10 +25,10 @@ int main(int argc, char **argv) {
   options.onnxruntime_path = argv[2];
   EXPECT(upt_init(&options), UPT_OK);
   EXPECT(upt_providers(NULL, 0, &needed), UPT_ERR_RUNTIME);
-  EXPECT(upt_model_open(argv[1], NULL, &model), UPT_ERR_RUNTIME);
+  EXPECT(upt_model_create(argv[1], NULL, &model), UPT_ERR_RUNTIME);
   EXPECT_TRUE(names_file(upt_last_error(), argv[2]));
   EXPECT_TRUE(model == NULL);
-  EXPECT(upt_model_open(argv[1], NULL, &model), UPT_ERR_RUNTIME);
+  EXPECT(upt_model_create(argv[1], NULL, &model), UPT_ERR_RUNTIME);
   EXPECT(upt_shutdown(), UPT_OK);
   printf("message: %s\n", upt_last_error());
   return expect_result("runtime_missing");

@@ -30,14 +30,14 @@ void walk_handles(void) {
   stats.struct_size = sizeof stats;
   EXPECT(upt_scene_reset((upt_scene *)(void *)model), UPT_ERR_HANDLE);
   EXPECT_TRUE(strstr(upt_last_error(), "it is a model") != NULL);
-  EXPECT(upt_model_get_info((upt_model *)(void *)scene, &info), UPT_ERR_HANDLE);
+  EXPECT(upt_model_read_info((upt_model *)(void *)scene, &info), UPT_ERR_HANDLE);
   EXPECT(upt_scene_reset((upt_scene *)(void *)&stats), UPT_ERR_HANDLE);
   EXPECT(upt_scene_destroy(scene), UPT_OK);
   EXPECT(upt_scene_destroy(scene), UPT_ERR_HANDLE);
   EXPECT_TRUE(strstr(upt_last_error(), "it was closed") != NULL);
   EXPECT(upt_scene_destroy(NULL), UPT_ERR_NULL);
   EXPECT(upt_scene_step(scene, NULL, NULL, 0), UPT_ERR_HANDLE);
-  EXPECT(upt_scene_get_stats(scene, &stats), UPT_ERR_HANDLE);
+  EXPECT(upt_scene_read_stats(scene, &stats), UPT_ERR_HANDLE);
 }
 
 static void *step_often(void *scene) {
@@ -80,7 +80,7 @@ int walk_panic(void) {
   EXPECT(test_panic(scene), UPT_ERR_PANIC);
   EXPECT(upt_scene_step(scene, NULL, NULL, 0), UPT_ERR_PANIC);
   EXPECT(upt_scene_reset(scene), UPT_ERR_PANIC);
-  EXPECT(upt_scene_get_stats(scene, &stats), UPT_OK);
+  EXPECT(upt_scene_read_stats(scene, &stats), UPT_OK);
   EXPECT_TRUE(stats.poisoned == 1);
   EXPECT(upt_scene_step(sane, NULL, NULL, 0), UPT_OK);
   EXPECT(upt_scene_destroy(scene), UPT_OK);

@@ -4,7 +4,7 @@
 
 #include "walk.h"
 
-static void on_log(int32_t level, const char *message, void *user) {
+static void on_log(upt_log_level level, const char *message, void *user) {
   (void)level;
   (void)message;
   ++*(int *)user;
@@ -52,42 +52,42 @@ void walk_model_open(const char *bundle, const char *damaged) {
   const int32_t cuda = UPT_PROVIDER_CUDA, unknown = 44;
   memset(&options, 0, sizeof options);
 
-  EXPECT(upt_model_open(NULL, NULL, &model), UPT_ERR_NULL);
-  EXPECT(upt_model_open(bundle, NULL, NULL), UPT_ERR_NULL);
-  EXPECT(upt_model_open("", NULL, &model), UPT_ERR_ARGUMENT);
-  EXPECT(upt_model_open("no/such/bundle", NULL, &model), UPT_ERR_IO);
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_STRUCT_SIZE);
+  EXPECT(upt_model_create(NULL, NULL, &model), UPT_ERR_NULL);
+  EXPECT(upt_model_create(bundle, NULL, NULL), UPT_ERR_NULL);
+  EXPECT(upt_model_create("", NULL, &model), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_create("no/such/bundle", NULL, &model), UPT_ERR_IO);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_ERR_STRUCT_SIZE);
   options.struct_size = sizeof options;
   options.portable = 2;
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_ERR_ARGUMENT);
   options.portable = 0;
   options.fallback = 7;
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_ERR_ARGUMENT);
   options.fallback = UPT_SWITCH_OFF;
   options.provider_count = 1;
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_NULL);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_ERR_NULL);
   options.providers = &unknown;
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_ERR_ARGUMENT);
   options.providers = &cuda;
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_PROVIDER);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_ERR_PROVIDER);
   options.provider_count = 0;
   options.providers = NULL;
   options.user_stream = path;
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_ERR_ARGUMENT);
   EXPECT_TRUE(strstr(upt_last_error(), "user_stream") != NULL);
   options.user_stream = NULL;
   options.precision = 12;
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_ERR_ARGUMENT);
   /* The fixtures have float32 graphs only. */
   options.precision = UPT_PRECISION_INT8;
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_ERR_UNSUPPORTED);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_ERR_UNSUPPORTED);
 
   snprintf(path, sizeof path, "%s/version", damaged);
-  EXPECT(upt_model_open(path, NULL, &model), UPT_ERR_VERSION);
+  EXPECT(upt_model_create(path, NULL, &model), UPT_ERR_VERSION);
   snprintf(path, sizeof path, "%s/hash", damaged);
-  EXPECT(upt_model_open(path, NULL, &model), UPT_ERR_BUNDLE);
+  EXPECT(upt_model_create(path, NULL, &model), UPT_ERR_BUNDLE);
   snprintf(path, sizeof path, "%s/json", damaged);
-  EXPECT(upt_model_open(path, NULL, &model), UPT_ERR_BUNDLE);
+  EXPECT(upt_model_create(path, NULL, &model), UPT_ERR_BUNDLE);
   EXPECT_TRUE(strstr(upt_last_error(), "bundle.json") != NULL);
   EXPECT_TRUE(model == NULL);
 
@@ -95,9 +95,9 @@ void walk_model_open(const char *bundle, const char *damaged) {
   options.providers = &cuda;
   options.provider_count = 1;
   options.fallback = UPT_SWITCH_DEFAULT;
-  EXPECT(upt_model_open(bundle, &options, &model), UPT_OK);
-  EXPECT(upt_model_close(model), UPT_OK);
-  EXPECT(upt_model_open(bundle, NULL, &model), UPT_OK);
+  EXPECT(upt_model_create(bundle, &options, &model), UPT_OK);
+  EXPECT(upt_model_destroy(model), UPT_OK);
+  EXPECT(upt_model_create(bundle, NULL, &model), UPT_OK);
 }
 
 void walk_model(void) {
@@ -106,11 +106,11 @@ void walk_model(void) {
   int32_t set;
   uint32_t one = 0, *indices;
   memset(&info, 0, sizeof info);
-  EXPECT(upt_model_get_info(NULL, &info), UPT_ERR_NULL);
-  EXPECT(upt_model_get_info(model, NULL), UPT_ERR_NULL);
-  EXPECT(upt_model_get_info(model, &info), UPT_ERR_STRUCT_SIZE);
+  EXPECT(upt_model_read_info(NULL, &info), UPT_ERR_NULL);
+  EXPECT(upt_model_read_info(model, NULL), UPT_ERR_NULL);
+  EXPECT(upt_model_read_info(model, &info), UPT_ERR_STRUCT_SIZE);
   info.struct_size = sizeof info;
-  EXPECT(upt_model_get_info(model, &info), UPT_OK);
+  EXPECT(upt_model_read_info(model, &info), UPT_OK);
   EXPECT_TRUE(info.struct_size == sizeof info);
   EXPECT_TRUE(info.node_count > 0 && info.tet_count > 0 && info.dt > 0.0F);
   EXPECT_TRUE(info.provider == UPT_PROVIDER_CPU);
@@ -125,22 +125,22 @@ void walk_model(void) {
   EXPECT_TRUE(all[0] == '{' && strlen(all) + 1 == needed);
   free(all);
 
-  EXPECT(upt_model_positions(NULL, before, floats), UPT_ERR_NULL);
-  EXPECT(upt_model_positions(model, NULL, floats), UPT_ERR_NULL);
-  EXPECT(upt_model_positions(model, before, floats - 1), UPT_ERR_ARGUMENT);
-  EXPECT(upt_model_positions(model, (float *)((char *)before + 1), floats), UPT_ERR_ARGUMENT);
-  EXPECT(upt_model_positions(model, before, floats), UPT_OK);
+  EXPECT(upt_model_read_positions(NULL, before, floats), UPT_ERR_NULL);
+  EXPECT(upt_model_read_positions(model, NULL, floats), UPT_ERR_NULL);
+  EXPECT(upt_model_read_positions(model, before, floats - 1), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_read_positions(model, (float *)((char *)before + 1), floats), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_read_positions(model, before, floats), UPT_OK);
   EXPECT_TRUE(isfinite(before[0]));
 
-  EXPECT(upt_model_indices(model, 99, NULL, 0, &needed), UPT_ERR_ARGUMENT);
-  EXPECT(upt_model_indices(NULL, UPT_SET_TETS, NULL, 0, &needed), UPT_ERR_NULL);
-  EXPECT(upt_model_indices(model, UPT_SET_TETS, NULL, 0, NULL), UPT_ERR_NULL);
-  EXPECT(upt_model_indices(model, UPT_SET_TETS, &one, 1, NULL), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_read_indices(model, 99, NULL, 0, &needed), UPT_ERR_ARGUMENT);
+  EXPECT(upt_model_read_indices(NULL, UPT_SET_TETS, NULL, 0, &needed), UPT_ERR_NULL);
+  EXPECT(upt_model_read_indices(model, UPT_SET_TETS, NULL, 0, NULL), UPT_ERR_NULL);
+  EXPECT(upt_model_read_indices(model, UPT_SET_TETS, &one, 1, NULL), UPT_ERR_ARGUMENT);
   for (set = UPT_SET_SURFACE_NODES; set <= UPT_SET_TETS; set++) {
     uint64_t i;
-    EXPECT(upt_model_indices(model, set, NULL, 0, &needed), UPT_OK);
+    EXPECT(upt_model_read_indices(model, set, NULL, 0, &needed), UPT_OK);
     indices = malloc((size_t)needed * sizeof *indices + 1);
-    EXPECT(upt_model_indices(model, set, indices, needed, NULL), UPT_OK);
+    EXPECT(upt_model_read_indices(model, set, indices, needed, NULL), UPT_OK);
     for (i = 0; i < needed; i++) {
       if (indices[i] >= info.node_count) {
         EXPECT_TRUE(indices[i] < info.node_count);

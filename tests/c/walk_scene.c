@@ -33,7 +33,7 @@ void walk_region_and_points(void) {
   EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, few, 12), UPT_OK);
   EXPECT(upt_scene_set_region(scene, NULL, 0), UPT_OK);
 
-  EXPECT(upt_model_positions(model, positions, floats), UPT_OK);
+  EXPECT(upt_model_read_positions(model, positions, floats), UPT_OK);
   memcpy(points, positions + 3 * contact_nodes[0], 3 * sizeof *points);
   memcpy(points + 3, positions + 3 * contact_nodes[1], 3 * sizeof *points);
   EXPECT(upt_scene_read_points(scene, points, 6), UPT_ERR_STATE);
@@ -68,7 +68,7 @@ void walk_instrument(void) {
   uint64_t count = 0;
   upt_status status;
   memset(&instrument, 0, sizeof instrument);
-  EXPECT(upt_model_positions(model, before, floats), UPT_OK);
+  EXPECT(upt_model_read_positions(model, before, floats), UPT_OK);
 
   EXPECT(upt_scene_contacts_from_instruments(NULL, &instrument, 1, NULL, NULL, 0, &count),
          UPT_ERR_NULL);
@@ -101,17 +101,17 @@ void walk_instrument(void) {
            UPT_ERR_NON_FINITE);
   }
 
-  EXPECT(upt_scene_contact_force(NULL, few, 12), UPT_ERR_NULL);
-  EXPECT(upt_scene_contact_force(scene, NULL, 12), UPT_ERR_NULL);
-  EXPECT(upt_scene_contact_force(scene, NULL, 0), bare ? UPT_ERR_UNSUPPORTED : UPT_OK);
+  EXPECT(upt_scene_read_contact_force(NULL, few, 12), UPT_ERR_NULL);
+  EXPECT(upt_scene_read_contact_force(scene, NULL, 12), UPT_ERR_NULL);
+  EXPECT(upt_scene_read_contact_force(scene, NULL, 0), bare ? UPT_ERR_UNSUPPORTED : UPT_OK);
   EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_OK);
-  status = upt_scene_contact_force(scene, few, 12);
+  status = upt_scene_read_contact_force(scene, few, 12);
   if (bare) {
     EXPECT(status, UPT_ERR_UNSUPPORTED);
   } else {
     EXPECT(status, UPT_OK);
     EXPECT_TRUE(isfinite(few[0]) && isfinite(few[11]));
-    EXPECT(upt_scene_contact_force(scene, few, 9), UPT_ERR_ARGUMENT);
+    EXPECT(upt_scene_read_contact_force(scene, few, 9), UPT_ERR_ARGUMENT);
   }
   EXPECT(upt_scene_destroy(scene), UPT_OK);
   free(nodes);
@@ -122,19 +122,26 @@ void walk_state(void) {
   upt_scene *scene = make_scene();
   upt_scene_stats stats;
   uint64_t needed = 0;
+  upt_scene_timing timing;
   uint8_t *bytes;
   int i;
   memset(&stats, 0, sizeof stats);
   for (i = 0; i < 3; i++) {
     EXPECT(step_nodes(scene, contact_nodes, contact_vectors, 4, NULL, 0), UPT_OK);
   }
-  EXPECT(upt_scene_get_stats(NULL, &stats), UPT_ERR_NULL);
-  EXPECT(upt_scene_get_stats(scene, NULL), UPT_ERR_NULL);
-  EXPECT(upt_scene_get_stats(scene, &stats), UPT_ERR_STRUCT_SIZE);
+  EXPECT(upt_scene_read_stats(NULL, &stats), UPT_ERR_NULL);
+  EXPECT(upt_scene_read_stats(scene, NULL), UPT_ERR_NULL);
+  EXPECT(upt_scene_read_stats(scene, &stats), UPT_ERR_STRUCT_SIZE);
   stats.struct_size = sizeof stats;
-  EXPECT(upt_scene_get_stats(scene, &stats), UPT_OK);
+  EXPECT(upt_scene_read_stats(scene, &stats), UPT_OK);
   EXPECT_TRUE(stats.step_count == 3 && stats.contact_count == 4);
-  EXPECT_TRUE(stats.step_ms > 0.0 && stats.max_displacement_mm > 1.0F);
+  EXPECT_TRUE(stats.max_displacement_mm > 1.0F);
+  memset(&timing, 0, sizeof timing);
+  EXPECT(upt_scene_read_timing(scene, NULL), UPT_ERR_NULL);
+  EXPECT(upt_scene_read_timing(scene, &timing), UPT_ERR_STRUCT_SIZE);
+  timing.struct_size = sizeof timing;
+  EXPECT(upt_scene_read_timing(scene, &timing), UPT_OK);
+  EXPECT_TRUE(timing.step_count == 3 && timing.step_ms > 0.0);
   EXPECT_TRUE(stats.poisoned == 0 && stats.sleeping == 0);
   EXPECT_TRUE(stats.prior_forces == (info.kind == UPT_KIND_REDUCED));
 

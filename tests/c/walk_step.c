@@ -34,17 +34,26 @@ void walk_scene_create(const char *reduced_bundle) {
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
   options.substeps = 0;
   /* A budget limits the bundle's own corrections, none here; a target needs a count. */
-  options.corrections_budget_us = 100;
-  options.corrections = UPT_CORRECTIONS_NONE;
+  options.corrections.budget_us = 100;
+  options.corrections.mode = UPT_CORRECTIONS_NONE;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
-  options.corrections = 0;
-  options.corrections_target_mm = 0.1f;
+  options.corrections.mode = UPT_CORRECTIONS_RECOMMENDED;
+  options.corrections.target_mm = 0.1f;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
-  options.corrections_target_mm = 0.0f;
+  options.corrections.target_mm = 0.0f;
+  /* A count belongs to its mode, and the mode to a count. */
+  options.corrections.count = 5;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.corrections.mode = UPT_CORRECTIONS_COUNT;
+  options.corrections.count = 0;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.corrections.mode = (upt_corrections_mode)7;
+  EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_ARGUMENT);
+  options.corrections.mode = UPT_CORRECTIONS_RECOMMENDED;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_OK);
   EXPECT(upt_scene_destroy(scene), UPT_OK);
   scene = NULL;
-  options.corrections_budget_us = 0;
+  options.corrections.budget_us = 0;
   /* A damping of the scene's own needs corrections too, and has bounds. */
   options.damping_per_s = 2.0;
   EXPECT(upt_scene_create(model, &options, &scene), UPT_ERR_UNSUPPORTED);
@@ -56,16 +65,16 @@ void walk_scene_create(const char *reduced_bundle) {
   options.mesh_path = "no/such.mesh.safetensors";
   EXPECT_TRUE(upt_scene_create(model, &options, &scene) < 0);
   /* A reduced bundle's tables belong to its own mesh. */
-  EXPECT(upt_model_open(reduced_bundle, NULL, &reduced), UPT_OK);
+  EXPECT(upt_model_create(reduced_bundle, NULL, &reduced), UPT_OK);
   EXPECT(upt_scene_create(reduced, &options, &scene), UPT_ERR_UNSUPPORTED);
   /* Its contact forces are the linear response's. */
   EXPECT(upt_scene_create(reduced, NULL, &scene), UPT_OK);
   stats.struct_size = sizeof stats;
-  EXPECT(upt_scene_get_stats(scene, &stats), UPT_OK);
+  EXPECT(upt_scene_read_stats(scene, &stats), UPT_OK);
   EXPECT_TRUE(stats.prior_forces == 1);
   EXPECT(upt_scene_destroy(scene), UPT_OK);
   scene = NULL;
-  EXPECT(upt_model_close(reduced), UPT_OK);
+  EXPECT(upt_model_destroy(reduced), UPT_OK);
   options.mesh_path = NULL;
   EXPECT_TRUE(scene == NULL);
   EXPECT(upt_scene_create(model, &options, &scene), UPT_OK);

@@ -70,7 +70,7 @@ static void instruments(const char *bundle) {
 static void haptics(const char *bundle) {
   upt::Model model = upt::Model::open(bundle);
   upt_scene_options corrected = upt::make<upt_scene_options>();
-  corrected.corrections = 5;
+  corrected.corrections = upt::corrections(5);
   const upt_instrument tool = upt::sphere(3.0F);
   upt::Scene plain(model);
   upt::Scene scene;
@@ -102,7 +102,7 @@ static void haptics(const char *bundle) {
 static void ties(const char *bundle) {
   upt::Model model = upt::Model::open(bundle);
   upt_scene_options options = upt::make<upt_scene_options>();
-  options.corrections = 5;
+  options.corrections = upt::corrections(5);
   upt::Scene scene(model, &options);
   const std::vector<float> rest = model.positions();
   const std::vector<std::uint32_t> domain = model.indices(UPT_SET_DOMAIN_NODES);
@@ -140,7 +140,7 @@ static void ties(const char *bundle) {
 static void cuts(const char *bundle) {
   upt::Model model = upt::Model::open(bundle);
   upt_scene_options options = upt::make<upt_scene_options>();
-  options.corrections = 5;
+  options.corrections = upt::corrections(5);
   upt::Scene scene(model, &options);
   const std::vector<float> rest = model.positions();
   float low[3] = {rest[0], rest[1], rest[2]}, high[3] = {rest[0], rest[1], rest[2]};

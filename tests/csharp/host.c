@@ -31,12 +31,12 @@ int main(int argc, char **argv) {
   }
   model_options.struct_size = sizeof model_options;
   model_options.threads = 1;
-  require(upt_model_open(argv[1], &model_options, &model), "upt_model_open");
+  require(upt_model_create(argv[1], &model_options, &model), "upt_model_create");
   info.struct_size = sizeof info;
-  require(upt_model_get_info(model, &info), "upt_model_get_info");
+  require(upt_model_read_info(model, &info), "upt_model_read_info");
   node_count = info.node_count;
-  require(upt_model_indices(model, UPT_SET_DOMAIN_NODES, NULL, 0, &domain_count),
-          "upt_model_indices");
+  require(upt_model_read_indices(model, UPT_SET_DOMAIN_NODES, NULL, 0, &domain_count),
+          "upt_model_read_indices");
   domain = malloc(domain_count * sizeof *domain);
   nodes = malloc(domain_count * sizeof *nodes);
   vectors = malloc(3 * domain_count * sizeof *vectors);
@@ -44,9 +44,9 @@ int main(int argc, char **argv) {
   u = malloc(3 * node_count * sizeof *u);
   if (!domain || !nodes || !vectors || !positions || !u)
     return 1;
-  require(upt_model_indices(model, UPT_SET_DOMAIN_NODES, domain, domain_count, &domain_count),
-          "upt_model_indices");
-  require(upt_model_positions(model, positions, 3 * node_count), "upt_model_positions");
+  require(upt_model_read_indices(model, UPT_SET_DOMAIN_NODES, domain, domain_count, &domain_count),
+          "upt_model_read_indices");
+  require(upt_model_read_positions(model, positions, 3 * node_count), "upt_model_read_positions");
   require(upt_scene_create(model, NULL, &scene), "upt_scene_create");
 
   for (step = 1; step <= 160; step++) {
@@ -76,7 +76,7 @@ int main(int argc, char **argv) {
     return 1;
   }
   require(upt_scene_destroy(scene), "upt_scene_destroy");
-  require(upt_model_close(model), "upt_model_close");
+  require(upt_model_destroy(model), "upt_model_destroy");
   require(upt_shutdown(), "upt_shutdown");
   free(domain);
   free(nodes);

@@ -22,7 +22,7 @@ pub struct Host {
 pub fn open(bundle: &std::path::Path) -> *mut upt_model {
     let path = CString::new(bundle.to_str().unwrap()).unwrap();
     let mut model = null_mut();
-    let status = unsafe { upt_model_open(path.as_ptr(), null(), &mut model) };
+    let status = unsafe { upt_model_create(path.as_ptr(), null(), &mut model) };
     assert_eq!(status, UPT_OK, "{}", message());
     model
 }
@@ -44,23 +44,24 @@ pub fn create(model: *mut upt_model, options: &upt_scene_options) -> *mut upt_sc
 pub fn node_count(model: *mut upt_model) -> usize {
     let mut info: upt_model_info = unsafe { std::mem::zeroed() };
     info.struct_size = size_of::<upt_model_info>() as u32;
-    assert_eq!(unsafe { upt_model_get_info(model, &mut info) }, UPT_OK);
+    assert_eq!(unsafe { upt_model_read_info(model, &mut info) }, UPT_OK);
     info.node_count as usize
 }
 
 pub fn stats(scene: *mut upt_scene) -> upt_scene_stats {
     let mut stats: upt_scene_stats = unsafe { std::mem::zeroed() };
     stats.struct_size = size_of::<upt_scene_stats>() as u32;
-    assert_eq!(unsafe { upt_scene_get_stats(scene, &mut stats) }, UPT_OK);
+    assert_eq!(unsafe { upt_scene_read_stats(scene, &mut stats) }, UPT_OK);
     stats
 }
 
 pub fn indices(model: *mut upt_model, set: i32) -> Vec<u32> {
     let mut needed = 0;
-    let status = unsafe { upt_model_indices(model, set, null_mut(), 0, &mut needed) };
+    let status = unsafe { upt_model_read_indices(model, set, null_mut(), 0, &mut needed) };
     assert_eq!(status, UPT_OK);
     let mut out = vec![0; needed as usize];
-    let status = unsafe { upt_model_indices(model, set, out.as_mut_ptr(), needed, null_mut()) };
+    let status =
+        unsafe { upt_model_read_indices(model, set, out.as_mut_ptr(), needed, null_mut()) };
     assert_eq!(status, UPT_OK);
     out
 }
@@ -95,6 +96,6 @@ impl Host {
 impl Drop for Host {
     fn drop(&mut self) {
         assert_eq!(unsafe { upt_scene_destroy(self.scene) }, UPT_OK);
-        assert_eq!(unsafe { upt_model_close(self.model) }, UPT_OK);
+        assert_eq!(unsafe { upt_model_destroy(self.model) }, UPT_OK);
     }
 }

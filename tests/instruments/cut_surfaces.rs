@@ -31,7 +31,7 @@ fn follow(scene: *mut upt_scene) -> (upt_surface, Kept) {
             inside: vec![9; out.triangle_count as usize],
             changed: vec![0; out.changed_count as usize],
         };
-        let status = upt_scene_surface(
+        let status = upt_scene_read_surface(
             scene,
             kept.rest.as_mut_ptr(),
             out.vertex_count,
@@ -95,7 +95,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
     let edge = slit(&own, 6.0, 15.0);
     let model = crate::host::open(std::path::Path::new("onnx/liver-coarse"));
     let mut made = crate::host::scene_options();
-    made.corrections = 5;
+    (made.corrections.mode, made.corrections.count) = (UPT_CORRECTIONS_COUNT, 5);
     let scene = crate::host::create(model, &made);
     // SAFETY: zeros are values of these structs, and each call keeps to the header.
     unsafe {
@@ -106,7 +106,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         one.position = tool.pose.translation.to_array();
         let input = upt_input::of_instruments(std::slice::from_ref(&one));
         let mut none = [0.0; 3];
-        let early = upt_scene_surface_positions(scene, none.as_mut_ptr(), 3);
+        let early = upt_scene_read_surface_positions(scene, none.as_mut_ptr(), 3);
         assert_eq!(early, UPT_ERR_STATE);
         let (first, whole) = follow(scene);
         let first = (first.is_new, first.first_vertex, first.changed_count);
@@ -118,12 +118,12 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         let status = upt_scene_cut(scene, 0, edge.as_flattened().as_ptr(), 2, 2, &mut cut);
         assert_eq!(status, UPT_OK, "{}", crate::host::message());
         let mut nodes = 0;
-        assert_eq!(upt_scene_node_count(scene, &mut nodes), UPT_OK);
+        assert_eq!(upt_scene_read_node_count(scene, &mut nodes), UPT_OK);
         assert_eq!(nodes, cut.node_count);
         // Stale: the vertices are not those of the body.
         let mut old = vec![0.0; whole.rest.len()];
         let floats = old.len() as u64;
-        let stale = upt_scene_surface_positions(scene, old.as_mut_ptr(), floats);
+        let stale = upt_scene_read_surface_positions(scene, old.as_mut_ptr(), floats);
         assert_eq!(stale, UPT_ERR_STATE);
 
         let (update, now) = follow(scene);
@@ -170,7 +170,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
             assert_eq!(status, UPT_OK, "{}", crate::host::message());
             step(&own, std::slice::from_ref(&tool));
         }
-        let status = upt_scene_surface_positions(scene, at.as_mut_ptr(), floats);
+        let status = upt_scene_read_surface_positions(scene, at.as_mut_ptr(), floats);
         assert_eq!(status, UPT_OK, "{}", crate::host::message());
         let mut in_rust = vec![0.0; at.len()];
         own.surface_positions(&mut in_rust).unwrap();
@@ -184,7 +184,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         let pressed = volume(&now.triangles, &at);
         assert!((pressed / volumes[0] - 1.0).abs() < 0.05, "{pressed}");
 
-        let wrong = upt_scene_surface(
+        let wrong = upt_scene_read_surface(
             scene,
             at.as_mut_ptr(),
             7,
@@ -195,7 +195,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
             0,
         );
         assert_eq!(wrong, UPT_ERR_ARGUMENT);
-        let short = upt_scene_surface_positions(scene, at.as_mut_ptr(), floats - 3);
+        let short = upt_scene_read_surface_positions(scene, at.as_mut_ptr(), floats - 3);
         assert_eq!(short, UPT_ERR_ARGUMENT);
         // The intact body is another one.
         assert_eq!(upt_scene_reset(scene), UPT_OK);
@@ -203,7 +203,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         assert_eq!((update.is_new, update.first_vertex), (1, 0));
         assert_eq!(again.triangles, whole.triangles);
         upt_scene_destroy(scene);
-        upt_model_close(model);
+        upt_model_destroy(model);
     }
     own.reset().unwrap();
     let mut at = vec![0.0; 3 * own.node_count()];

@@ -158,7 +158,7 @@ fn a_host_in_c_cuts_as_one_in_rust() {
     let edge = slit(&own, 6.0, 15.0);
     let model = crate::host::open(std::path::Path::new("onnx/liver-coarse"));
     let mut options = crate::host::scene_options();
-    options.corrections = 5;
+    (options.corrections.mode, options.corrections.count) = (UPT_CORRECTIONS_COUNT, 5);
     let scene = crate::host::create(model, &options);
     // SAFETY: zeros are values of these structs, and each call keeps to the header.
     unsafe {
@@ -226,6 +226,6 @@ fn a_host_in_c_cuts_as_one_in_rust() {
         );
         assert_eq!(status, UPT_OK);
         upt_scene_destroy(scene);
-        upt_model_close(model);
+        upt_model_destroy(model);
     }
 }

@@ -14,7 +14,7 @@ use crate::host::{Host, indices, message};
 fn pressing(host: &Host, depth: f32) -> upt_instrument {
     let mut positions = vec![0.0f32; 3 * host.nodes];
     let floats = positions.len() as u64;
-    let read = unsafe { upt_model_positions(host.model, positions.as_mut_ptr(), floats) };
+    let read = unsafe { upt_model_read_positions(host.model, positions.as_mut_ptr(), floats) };
     assert_eq!(read, UPT_OK);
     let domain = indices(host.model, UPT_SET_DOMAIN_NODES);
     let at = 3 * domain[domain.len() / 2] as usize;
@@ -87,7 +87,7 @@ fn no_place_with_a_capacity_is_an_error() {
         let mut needed = 7;
         let scene = host.scene;
         let status =
-            unsafe { upt_scene_instrument_contacts(scene, null_mut(), capacity, &mut needed) };
+            unsafe { upt_scene_read_instrument_contacts(scene, null_mut(), capacity, &mut needed) };
         (status, needed)
     };
     for round in 0..2 {

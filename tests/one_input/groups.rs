@@ -327,15 +327,16 @@ fn the_c_interface_moves_groups() {
     let mut needed = 0;
     let read = unsafe {
         let (to, room) = (found.as_mut_ptr(), found.len() as u64);
-        upt_model_support(host.model, 1, name.as_mut_ptr(), 16, to, room, &mut needed)
+        upt_model_read_support(host.model, 1, name.as_mut_ptr(), 16, to, room, &mut needed)
     };
     assert_eq!((read, needed as usize), (UPT_OK, found.len()));
     assert_eq!(found, nodes(&own, 1));
     let text = unsafe { std::ffi::CStr::from_ptr(name.as_ptr()) };
     assert_eq!(text.to_str().unwrap(), "right");
     let none = std::ptr::null_mut();
-    let read =
-        unsafe { upt_model_support(host.model, 2, none, 0, std::ptr::null_mut(), 0, &mut needed) };
+    let read = unsafe {
+        upt_model_read_support(host.model, 2, none, 0, std::ptr::null_mut(), 0, &mut needed)
+    };
     assert_eq!(read, UPT_ERR_ARGUMENT);
     assert!(message().contains("the bundle has 2"), "{}", message());
 }

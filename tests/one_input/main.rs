@@ -35,7 +35,7 @@ const BUNDLE: &str = "tiny-corrected";
 fn ball(host: &Host, depth: f32) -> upt_instrument {
     let mut positions = vec![0.0f32; 3 * host.nodes];
     let floats = positions.len() as u64;
-    let read = unsafe { upt_model_positions(host.model, positions.as_mut_ptr(), floats) };
+    let read = unsafe { upt_model_read_positions(host.model, positions.as_mut_ptr(), floats) };
     assert_eq!(read, UPT_OK);
     let domain = indices(host.model, UPT_SET_DOMAIN_NODES);
     let at = 3 * domain[domain.len() / 2] as usize;
@@ -172,8 +172,8 @@ fn zeros_are_a_step_of_free_motion() {
     // Substeps: tissue that a tool let go swings by the elements, and not by the learned part.
     let corrected = |options: &mut upt_scene_options| {
         awake(options);
-        options.corrections = UPT_CORRECTIONS_AUTO;
-        (options.corrections_target_mm, options.substeps) = (0.02, 4);
+        options.corrections.mode = UPT_CORRECTIONS_AUTO;
+        (options.corrections.target_mm, options.substeps) = (0.02, 4);
     };
     let options = SceneOptions {
         corrections: Corrections::Auto {

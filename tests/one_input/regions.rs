@@ -38,7 +38,7 @@ fn a_pressure_acts_on_a_region_that_the_bundle_names() {
     let mut name = [0 as std::ffi::c_char; 8];
     let read = |at, name: &mut [std::ffi::c_char; 8], nodes: &mut [u32], needed: &mut u64| unsafe {
         let (to, room) = (nodes.as_mut_ptr(), nodes.len() as u64);
-        upt_model_region(host.model, at, name.as_mut_ptr(), 8, to, room, needed)
+        upt_model_read_region(host.model, at, name.as_mut_ptr(), 8, to, room, needed)
     };
     assert_eq!(read(0, &mut name, &mut nodes, &mut needed), UPT_OK);
     assert_eq!(nodes, bed);

@@ -218,7 +218,7 @@ fn ties_give_the_same_bits_however_they_are_given() {
             ties.len()
         ];
         let status =
-            unsafe { upt_scene_tie_readings(direct.scene, told.as_mut_ptr(), told.len() as u64) };
+            unsafe { upt_scene_read_ties(direct.scene, told.as_mut_ptr(), told.len() as u64) };
         assert_eq!(status, UPT_OK, "{}", message());
         for (told, reading) in told.iter().zip(&readings) {
             assert_eq!(

@@ -61,13 +61,16 @@ impl Rig {
 
     pub fn open(&mut self) -> i32 {
         let status =
-            counted(|| unsafe { upt_model_open(self.path.as_ptr(), null(), &mut self.model) });
+            counted(|| unsafe { upt_model_create(self.path.as_ptr(), null(), &mut self.model) });
         if status == UPT_OK {
             // What the host has of its own is no call's request.
             self.positions = vec![0.0; 3 * host::node_count(self.model)];
             let floats = self.positions.len() as u64;
             let out = self.positions.as_mut_ptr();
-            assert_eq!(unsafe { upt_model_positions(self.model, out, floats) }, 0);
+            assert_eq!(
+                unsafe { upt_model_read_positions(self.model, out, floats) },
+                0
+            );
             self.domain = host::indices(self.model, UPT_SET_DOMAIN_NODES);
             self.given.reserve(1 << 20);
         }
@@ -101,7 +104,7 @@ impl Rig {
         }
         let mut nodes = 0;
         assert_eq!(
-            unsafe { upt_scene_node_count(self.scene, &mut nodes) },
+            unsafe { upt_scene_read_node_count(self.scene, &mut nodes) },
             UPT_OK
         );
         let mut out = vec![0.0f32; 3 * nodes as usize];
@@ -122,12 +125,12 @@ impl Rig {
             reading.struct_size = size_of::<upt_instrument_reading>() as u32;
         }
         let status =
-            counted(|| unsafe { upt_scene_instrument_readings(self.scene, out.as_mut_ptr(), 2) });
+            counted(|| unsafe { upt_scene_read_instruments(self.scene, out.as_mut_ptr(), 2) });
         let forces = out.map(|reading| (reading.force, reading.torque));
         let status = self.give(status, &forces);
         let mut needed = 0;
         let asked = counted(|| unsafe {
-            upt_scene_instrument_contacts(self.scene, null_mut(), 0, &mut needed)
+            upt_scene_read_instrument_contacts(self.scene, null_mut(), 0, &mut needed)
         });
         match asked {
             UPT_OK => self.give(status, &[needed]),
@@ -286,7 +289,7 @@ impl Rig {
         let count = host::stats(self.scene).contact_count;
         let mut out = vec![0.0f32; 3 * count as usize];
         let status = counted(|| unsafe {
-            upt_scene_contact_force(self.scene, out.as_mut_ptr(), out.len() as u64)
+            upt_scene_read_contact_force(self.scene, out.as_mut_ptr(), out.len() as u64)
         });
         self.give(status, &out)
     }
@@ -352,7 +355,7 @@ impl Drop for Rig {
             assert_eq!(unsafe { upt_scene_destroy(self.scene) }, UPT_OK);
         }
         if !self.model.is_null() {
-            assert_eq!(unsafe { upt_model_close(self.model) }, UPT_OK);
+            assert_eq!(unsafe { upt_model_destroy(self.model) }, UPT_OK);
         }
     }
 }

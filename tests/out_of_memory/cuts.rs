@@ -41,7 +41,7 @@ impl Rig {
         if status == UPT_OK {
             let place = at.as_mut_ptr();
             let read = counted(|| unsafe {
-                upt_scene_surface_positions(self.scene, place, 3 * out.vertex_count)
+                upt_scene_read_surface_positions(self.scene, place, 3 * out.vertex_count)
             });
             assert_eq!(read, UPT_OK);
         }

@@ -38,7 +38,7 @@ fn go_on(what: &str, rig: &mut Rig, calls: &[Call], given: &[Vec<u8>]) {
 /// the standard library has no error, or what serde_json, safetensors and ort make of a file's header and names.
 fn least(call: &str) -> usize {
     match call {
-        "upt_model_open" => 2560,
+        "upt_model_create" => 2560,
         "upt_scene_create" => 2048,
         "upt_haptics_create" => 1536,
         "upt_scene_attach_points" => 1024,
@@ -126,11 +126,11 @@ type Case = (PathBuf, upt_scene_options, &'static [Call]);
 
 fn cases(grouped: &Path) -> Vec<Case> {
     let corrected = options(|options| {
-        options.corrections = 3;
-        options.corrections_target_mm = 1e-4;
+        (options.corrections.mode, options.corrections.count) = (UPT_CORRECTIONS_COUNT, 3);
+        options.corrections.target_mm = 1e-4;
         options.substeps = 2;
     });
-    let plain = options(|options| options.corrections = UPT_CORRECTIONS_NONE);
+    let plain = options(|options| options.corrections.mode = UPT_CORRECTIONS_NONE);
     let brain = |name: &str| {
         Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("onnx")

@@ -4,7 +4,7 @@ use upt::ffi::UPT_MODE_GRASP;
 
 use crate::calls::{Call, Rig};
 
-const OPEN: Call = ("upt_model_open", Rig::open);
+const OPEN: Call = ("upt_model_create", Rig::open);
 const CREATE: Call = ("upt_scene_create", Rig::create);
 
 /// All of them, of a scene that corrects.
@@ -35,7 +35,7 @@ pub const CORRECTED: &[Call] = &[
     ("upt_scene_restore", Rig::restore),
     ("a frame after a restored state", |rig| rig.present(0.01)),
     ("a step after a restored state", |rig| rig.drive(1.0)),
-    ("upt_scene_contact_force", Rig::contact_force),
+    ("upt_scene_read_contact_force", Rig::contact_force),
     ("a free step", Rig::free),
     ("upt_scene_reset", Rig::reset),
     ("upt_scene_contacts_from_instruments", |rig| {
@@ -92,7 +92,7 @@ pub const PLAIN: &[Call] = &[
     OPEN,
     CREATE,
     ("a first step of nodes", |rig| rig.push(-0.5)),
-    ("upt_scene_contact_force", Rig::contact_force),
+    ("upt_scene_read_contact_force", Rig::contact_force),
     ("upt_scene_attach_points", Rig::attach),
     ("upt_scene_set_region", Rig::region),
     ("a step of a region", |rig| rig.push(-1.0)),

@@ -68,7 +68,7 @@ const tests = {
   async damaged_bundles_are_refused_in_the_librarys_words() {
     const upt = await start();
     const files = bundle(LIVER);
-    await assert.rejects(upt.open({ ...files, "prior.safetensors": files["prior.safetensors"].subarray(0, 1000) }), refused("UPT_ERR_BUNDLE", /^upt_model_open: prior\.safetensors: has 1000 bytes, bundle\.json field `files\.prior\.safetensors\.bytes` says/));
+    await assert.rejects(upt.open({ ...files, "prior.safetensors": files["prior.safetensors"].subarray(0, 1000) }), refused("UPT_ERR_BUNDLE", /^upt_model_create: prior\.safetensors: has 1000 bytes, bundle\.json field `files\.prior\.safetensors\.bytes` says/));
     const damaged = Uint8Array.from(files["prior.safetensors"]);
     damaged[damaged.length - 1] ^= 1;
     await assert.rejects(upt.open({ ...files, "prior.safetensors": damaged }), refused("UPT_ERR_BUNDLE", /prior\.safetensors: SHA-256 is/));

@@ -27,7 +27,7 @@ int main(int argc, char **argv) {
   upt_instrument ball;
   upt_input input;
   upt_instrument_reading reading;
-  upt_scene_stats stats;
+  upt_scene_timing timing;
   upt_model *model = NULL;
   upt_scene *scene = NULL;
   uint32_t *domain;
@@ -42,20 +42,21 @@ int main(int argc, char **argv) {
   memset(&portable, 0, sizeof portable);
   portable.struct_size = sizeof portable;
   portable.portable = 1;
-  ok(upt_model_open(argv[1], &portable, &model));
+  ok(upt_model_create(argv[1], &portable, &model));
   memset(&info, 0, sizeof info);
   info.struct_size = sizeof info;
-  ok(upt_model_get_info(model, &info));
+  ok(upt_model_read_info(model, &info));
   memset(&options, 0, sizeof options);
   options.struct_size = sizeof options;
-  options.corrections = atoi(argv[3]);
+  options.corrections.mode = UPT_CORRECTIONS_COUNT;
+  options.corrections.count = (uint32_t)atoi(argv[3]);
   options.step_s = 0.02;
   ok(upt_scene_create(model, &options, &scene));
   rest = malloc(3 * info.node_count * sizeof *rest);
   out = malloc(3 * info.node_count * sizeof *out);
   domain = malloc(info.domain_node_count * sizeof *domain);
-  ok(upt_model_positions(model, rest, 3 * info.node_count));
-  ok(upt_model_indices(model, UPT_SET_DOMAIN_NODES, domain, info.domain_node_count, NULL));
+  ok(upt_model_read_positions(model, rest, 3 * info.node_count));
+  ok(upt_model_read_indices(model, UPT_SET_DOMAIN_NODES, domain, info.domain_node_count, NULL));
   tip = rest + 3 * domain[0];
   memset(&ball, 0, sizeof ball);
   ball.struct_size = sizeof ball;
@@ -68,8 +69,8 @@ int main(int argc, char **argv) {
   input.instrument_count = 1;
   memset(&reading, 0, sizeof reading);
   reading.struct_size = sizeof reading;
-  memset(&stats, 0, sizeof stats);
-  stats.struct_size = sizeof stats;
+  memset(&timing, 0, sizeof timing);
+  timing.struct_size = sizeof timing;
   for (step = 0; step < atol(argv[2]); step++) {
     /* 8 mm down, 4 mm aside, and up: half a millimetre a step. */
     const double down = step < 16 ? step : step < 24 ? 16 : 40 - step;
@@ -79,14 +80,14 @@ int main(int argc, char **argv) {
     ball.position[2] = (float)((double)tip[2] + 6.0 - 0.5 * down);
     ok(upt_scene_step(scene, &input, out, 3 * info.node_count));
     fwrite(out, sizeof *out, 3 * info.node_count, file);
-    ok(upt_scene_get_stats(scene, &stats));
-    printf("%.4f\n", stats.step_ms);
-    ok(upt_scene_instrument_readings(scene, &reading, 1));
+    ok(upt_scene_read_timing(scene, &timing));
+    printf("%.4f\n", timing.step_ms);
+    ok(upt_scene_read_instruments(scene, &reading, 1));
     fwrite(reading.force, sizeof *out, 3, file);
     ok(upt_scene_present(scene, &input, 0.007, NULL, out, 3 * info.node_count));
     fwrite(out, sizeof *out, 3 * info.node_count, file);
   }
   ok(upt_scene_destroy(scene));
-  ok(upt_model_close(model));
+  ok(upt_model_destroy(model));
   return fclose(file) == 0 ? 0 : 1;
 }

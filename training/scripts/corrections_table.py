@@ -4,7 +4,7 @@
         --counts 0,1,3,5,10,10@0.02 --page PAGE
 
 Each case of the data is replayed through `upt rollout --json` with each count. The contact force is that of
-`upt_scene_contact_force`, summed over the nodes of a step, against the solver's over all steps with contact. The
+`upt_scene_read_contact_force`, summed over the nodes of a step, against the solver's over all steps with contact. The
 estimate is compared with the true root mean square error in the steps with contact: rank correlation, of the regimes
 that bundles learn from and of the hard ones, and their ratio (times the bundle's `calibration` the better one).
 `hard-ring` is left out of that: its tissue has another damping than the bundle says. With corrections `upt rollout`

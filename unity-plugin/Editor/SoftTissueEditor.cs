@@ -32,7 +32,7 @@ namespace Upt.Editor
             SoftTissue tissue = (SoftTissue)target;
             if (!Application.isPlaying || !tissue.IsRunning) return;
             upt_scene_stats stats = tissue.LastStats;
-            EditorGUILayout.LabelField("Step", stats.step_ms.ToString("0.000") + " ms, " + tissue.ContactCount +
+            EditorGUILayout.LabelField("Step", tissue.LastTiming.step_ms.ToString("0.000") + " ms, " + tissue.ContactCount +
                                                    " contacts" + (stats.sleeping != 0 ? ", asleep" : ""));
             if (stats.corrections > 0)
                 EditorGUILayout.LabelField("Corrections", stats.corrections + ", estimated error " +

@@ -44,14 +44,14 @@ function instrument({ position, rotation, radius, half_length: halfLength, frict
 }
 
 // A frame as the server sends it.
-function packed({ displacement, instruments: [tool], readings: [reading], stats, recording, replaying, frameMs }, sequence) {
+function packed({ displacement, instruments: [tool], readings: [reading], stats, timing, recording, replaying, frameMs }, sequence) {
   const data = new ArrayBuffer(4 * (HEADER + displacement.length));
   const [words, numbers] = [new Uint32Array(data, 0, HEADER), new Float32Array(data)];
   words[0] = sequence;
   words[1] = stats.flags;
   words[2] = reading?.contact_count ?? 0;
   words[3] = Number(recording) | (Number(replaying) << 1) | (stats.sleeping << 2);
-  numbers[4] = stats.step_ms;
+  numbers[4] = timing.step_ms;
   numbers[5] = stats.indicator;
   numbers.set(reading?.force ?? [0, 0, 0], 6);
   numbers[9] = stats.max_displacement_mm;

@@ -45,8 +45,10 @@ export const UPT_STEP_AUTO = 0;
 export const UPT_STEP_SPLIT = 1;
 export const UPT_STEP_WHOLE = 2;
 export const UPT_STEP_MEASURED = 3;
-export const UPT_CORRECTIONS_NONE = -1;
-export const UPT_CORRECTIONS_AUTO = -2;
+export const UPT_CORRECTIONS_RECOMMENDED = 0;
+export const UPT_CORRECTIONS_NONE = 1;
+export const UPT_CORRECTIONS_COUNT = 2;
+export const UPT_CORRECTIONS_AUTO = 3;
 export const UPT_SWITCH_DEFAULT = 0;
 export const UPT_SWITCH_ON = 1;
 export const UPT_SWITCH_OFF = 2;
@@ -136,6 +138,15 @@ export const upt_model_info = {
     frame_step_s: ["Float64", 88, 1],
   },
 };
+export const upt_corrections = {
+  size: 16,
+  fields: {
+    mode: ["Int32", 0, 1],
+    count: ["Uint32", 4, 1],
+    budget_us: ["Uint32", 8, 1],
+    target_mm: ["Float32", 12, 1],
+  },
+};
 export const upt_scene_options = {
   size: 72,
   fields: {
@@ -145,7 +156,7 @@ export const upt_scene_options = {
     precision: ["Int32", 12, 1],
     guard_policy: ["Int32", 16, 1],
     mesh_path: ["Uint32", 20, 1],
-    free_boundary: ["Uint8", 24, 1],
+    boundary: ["Uint8", 24, 1],
     sleep: ["Uint8", 25, 1],
     check_inversion: ["Uint8", 26, 1],
     latest_wins: ["Uint8", 27, 1],
@@ -154,10 +165,11 @@ export const upt_scene_options = {
     substeps: ["Uint8", 30, 1],
     reserved: ["Uint8", 31, 1],
     step_path: ["Int32", 32, 1],
-    corrections: ["Int32", 36, 1],
-    corrections_budget_us: ["Uint32", 40, 1],
-    corrections_target_mm: ["Float32", 44, 1],
-    error_limit_mm: ["Float32", 48, 1],
+    "corrections.mode": ["Int32", 36, 1],
+    "corrections.count": ["Uint32", 40, 1],
+    "corrections.budget_us": ["Uint32", 44, 1],
+    "corrections.target_mm": ["Float32", 48, 1],
+    error_limit_mm: ["Float32", 52, 1],
     step_s: ["Float64", 56, 1],
     damping_per_s: ["Float64", 64, 1],
   },
@@ -208,10 +220,38 @@ export const upt_haptic_force = {
   },
 };
 export const upt_scene_stats = {
-  size: 192,
+  size: 96,
   fields: {
     struct_size: ["Uint32", 0, 1],
     flags: ["Uint32", 4, 1],
+    step_count: ["BigUint64", 8, 1],
+    decoded_node_count: ["BigUint64", 16, 1],
+    contact_count: ["BigUint64", 24, 1],
+    memory_bytes: ["BigUint64", 32, 1],
+    threads: ["Uint32", 40, 1],
+    kernel: ["Int32", 44, 1],
+    provider: ["Int32", 48, 1],
+    precision: ["Int32", 52, 1],
+    max_displacement_mm: ["Float32", 56, 1],
+    indicator: ["Float32", 60, 1],
+    sleeping: ["Uint8", 64, 1],
+    poisoned: ["Uint8", 65, 1],
+    prior_forces: ["Uint8", 66, 1],
+    substeps: ["Uint8", 67, 1],
+    reserved: ["Uint8", 68, 4],
+    step_path: ["Int32", 72, 1],
+    corrections: ["Uint32", 76, 1],
+    evaluations: ["Uint32", 80, 1],
+    residual: ["Float32", 84, 1],
+    error_mm: ["Float32", 88, 1],
+    min_det: ["Float32", 92, 1],
+  },
+};
+export const upt_scene_timing = {
+  size: 112,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    reserved: ["Uint8", 4, 4],
     step_count: ["BigUint64", 8, 1],
     step_ms: ["Float64", 16, 1],
     check_ms: ["Float64", 24, 1],
@@ -221,30 +261,10 @@ export const upt_scene_stats = {
     latent_ms: ["Float64", 56, 1],
     decode_ms: ["Float64", 64, 1],
     guard_ms: ["Float64", 72, 1],
-    decoded_node_count: ["BigUint64", 80, 1],
-    contact_count: ["BigUint64", 88, 1],
-    memory_bytes: ["BigUint64", 96, 1],
-    threads: ["Uint32", 104, 1],
-    kernel: ["Int32", 108, 1],
-    provider: ["Int32", 112, 1],
-    precision: ["Int32", 116, 1],
-    max_displacement_mm: ["Float32", 120, 1],
-    indicator: ["Float32", 124, 1],
-    sleeping: ["Uint8", 128, 1],
-    poisoned: ["Uint8", 129, 1],
-    prior_forces: ["Uint8", 130, 1],
-    substeps: ["Uint8", 131, 1],
-    reserved: ["Uint8", 132, 4],
-    upload_ms: ["Float64", 136, 1],
-    download_ms: ["Float64", 144, 1],
-    step_path: ["Int32", 152, 1],
-    corrections: ["Uint32", 156, 1],
-    corrections_ms: ["Float64", 160, 1],
-    evaluations: ["Uint32", 168, 1],
-    residual: ["Float32", 172, 1],
-    error_mm: ["Float32", 176, 1],
-    min_det: ["Float32", 180, 1],
-    contact_ms: ["Float64", 184, 1],
+    corrections_ms: ["Float64", 80, 1],
+    contact_ms: ["Float64", 88, 1],
+    upload_ms: ["Float64", 96, 1],
+    download_ms: ["Float64", 104, 1],
   },
 };
 export const upt_input = {

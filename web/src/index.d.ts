@@ -104,12 +104,20 @@ export interface Stats {
   /** UPT_FLAG_*. */
   flags: number;
   step_count: number;
-  step_ms: number;
   max_displacement_mm: number;
   corrections: number;
   error_mm: number;
   indicator: number;
   sleeping: number;
+  [field: string]: number;
+}
+
+/** The fields of `upt_scene_timing`: what the last step and its stages took, ms. */
+export interface Timing {
+  step_count: number;
+  step_ms: number;
+  corrections_ms: number;
+  contact_ms: number;
   [field: string]: number;
 }
 
@@ -140,6 +148,7 @@ export interface Scene {
   /** Of the last step's instruments, in their order. */
   readings(): Reading[];
   stats(): Stats;
+  timing(): Timing;
   /** The nodes that are shown from here on; none means all. */
   setRegion(nodes?: ArrayLike<number> & Iterable<number>): void;
   /** Points [p,3] at rest, mm. */

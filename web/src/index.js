@@ -6,7 +6,7 @@ import { Module, UptError } from "./module.js";
 export { UptError };
 
 const MODES = { slide: abi.UPT_MODE_SLIDE, grasp: abi.UPT_MODE_GRASP };
-const SHAPES = { capsule: abi.UPT_SHAPE_CAPSULE, box: abi.UPT_SHAPE_BOX, spatula: abi.UPT_SHAPE_SPATULA };
+const SHAPES = { sphere: abi.UPT_SHAPE_SPHERE, capsule: abi.UPT_SHAPE_CAPSULE, box: abi.UPT_SHAPE_BOX, spatula: abi.UPT_SHAPE_SPATULA };
 const SETS = {
   surfaceNodes: abi.UPT_SET_SURFACE_NODES,
   domainNodes: abi.UPT_SET_DOMAIN_NODES,
@@ -15,7 +15,7 @@ const SETS = {
   domainFaces: abi.UPT_SET_DOMAIN_FACES,
   tets: abi.UPT_SET_TETS,
 };
-const CORRECTIONS = { recommended: 0, none: abi.UPT_CORRECTIONS_NONE, auto: abi.UPT_CORRECTIONS_AUTO };
+const CORRECTIONS = { recommended: abi.UPT_CORRECTIONS_RECOMMENDED, none: abi.UPT_CORRECTIONS_NONE, auto: abi.UPT_CORRECTIONS_AUTO };
 const GUARDS = { hold: abi.UPT_GUARD_HOLD, report: abi.UPT_GUARD_REPORT, blend: abi.UPT_GUARD_BLEND };
 
 function choice(names, name, what) {
@@ -74,7 +74,7 @@ class Model {
 
   /** What the model is: the fields of `upt_model_info`. */
   get info() {
-    this.#info ??= this.#module.filled(abi.upt_model_info, "upt_model_get_info", this.handle);
+    this.#info ??= this.#module.filled(abi.upt_model_info, "upt_model_read_info", this.handle);
     return this.#info;
   }
 
@@ -91,7 +91,7 @@ class Model {
   positions() {
     const count = 3 * this.info.node_count;
     return this.#module.withRoom(4 * count, (at) => {
-      this.#module.run("upt_model_positions", this.handle, at, BigInt(count));
+      this.#module.run("upt_model_read_positions", this.handle, at, BigInt(count));
       return this.#module.floats(at, count).slice();
     });
   }
@@ -99,9 +99,9 @@ class Model {
   /** An index set, such as "surfaceFaces". */
   indices(set) {
     const number = choice(SETS, set, "the index set");
-    const count = this.#module.out("upt_model_indices", this.handle, number, 0, 0n);
+    const count = this.#module.out("upt_model_read_indices", this.handle, number, 0, 0n);
     return this.#module.withRoom(4 * count, (at) => {
-      this.#module.run("upt_model_indices", this.handle, number, at, BigInt(count), 0);
+      this.#module.run("upt_model_read_indices", this.handle, number, at, BigInt(count), 0);
       return this.#module.words(at, count).slice();
     });
   }
@@ -113,7 +113,7 @@ class Model {
 
   /** Frees the model. Its scenes stay usable. */
   close() {
-    this.#module.run("upt_model_close", this.handle);
+    this.#module.run("upt_model_destroy", this.handle);
   }
 }
 
@@ -132,12 +132,13 @@ class Scene {
   constructor(module, model, nodes, options = {}) {
     const { corrections = "recommended", guard = "hold", stepSeconds = 0, ...more } = options;
     const values = {
-      corrections: typeof corrections === "number" ? corrections : choice(CORRECTIONS, corrections, "corrections"),
+      "corrections.mode": typeof corrections === "number" ? abi.UPT_CORRECTIONS_COUNT : choice(CORRECTIONS, corrections, "corrections"),
+      "corrections.count": typeof corrections === "number" ? corrections : 0,
+      "corrections.target_mm": more.targetMm ?? 0,
+      "corrections.budget_us": more.budgetUs ?? 0,
       guard_policy: choice(GUARDS, guard, "guard"),
       step_s: stepSeconds,
       damping_per_s: more.dampingPerSecond ?? 0,
-      corrections_target_mm: more.targetMm ?? 0,
-      corrections_budget_us: more.budgetUs ?? 0,
       error_limit_mm: more.errorLimitMm ?? 0,
       substeps: more.substeps ?? 0,
       sleep: more.neverSleeps ? abi.UPT_SWITCH_OFF : 0,
@@ -179,14 +180,19 @@ class Scene {
     this.#refuseIfClosed();
     return this.#module.withRoom(size * count, (at) => {
       for (let i = 0; i < count; i += 1) this.#module.write(at + size * i, abi.upt_instrument_reading, {});
-      this.#module.run("upt_scene_instrument_readings", this.handle, at, BigInt(count));
+      this.#module.run("upt_scene_read_instruments", this.handle, at, BigInt(count));
       return Array.from({ length: count }, (_, i) => this.#module.read(at + size * i, abi.upt_instrument_reading));
     });
   }
 
-  /** What the last step did and cost: the fields of `upt_scene_stats`. */
+  /** What the last step took, in milliseconds: the fields of `upt_scene_timing`. */
+  timing() {
+    return this.#module.filled(abi.upt_scene_timing, "upt_scene_read_timing", this.handle);
+  }
+
+  /** What the last step did: the fields of `upt_scene_stats`. */
   stats() {
-    return this.#module.filled(abi.upt_scene_stats, "upt_scene_get_stats", this.handle);
+    return this.#module.filled(abi.upt_scene_stats, "upt_scene_read_stats", this.handle);
   }
 
   /** The nodes that are shown from here on; none means all. */

@@ -11,7 +11,7 @@ let framed = 0; // when the last frame was made, s
 let timer;
 let attached = false;
 let instruments = []; // of the last step
-let last = { readings: [], stats: undefined };
+let last = { readings: [], stats: undefined, timing: undefined };
 let recording;
 let recorded = [];
 let replayed; // the recorded step that comes next
@@ -46,7 +46,7 @@ const answers = {
     for (const node of model.indices("domainNodes")) if (place.has(node)) domain[place.get(node)] = 1;
     const faces = model.indices("surfaceFaces").map((node) => place.get(node));
     scene.setRegion(nodes);
-    last.stats = scene.stats();
+    last = measured([]);
     return { info: { ...info, name: model.describe().name }, nodes, positions, faces, domain, stepSeconds: dt };
   },
 
@@ -78,7 +78,7 @@ const answers = {
     scene.reset();
     clock = new Clock(dt);
     replayed = undefined;
-    last = { readings: [], stats: scene.stats() };
+    last = measured([]);
   },
 
   record(on) {
@@ -93,6 +93,10 @@ const answers = {
   },
 };
 
+function measured(readings) {
+  return { readings, stats: scene.stats(), timing: scene.timing() };
+}
+
 // The steps that are due, one at a time, so that a frame that is asked for meanwhile comes between.
 function stepOn() {
   if (!clock.due(framed)) return;
@@ -104,7 +108,7 @@ function stepOn() {
   if (recording && recording.length < LONGEST_RECORDING) recording.push(instruments);
   try {
     scene.step(instruments);
-    last = { readings: scene.readings(), stats: scene.stats() };
+    last = measured(scene.readings());
   } catch (error) {
     failed = error;
     return;

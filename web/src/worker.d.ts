@@ -1,4 +1,4 @@
-import type { BundleSource, Instrument, ModelInfo, Reading, SceneOptions, Stats } from "./index.js";
+import type { BundleSource, Instrument, ModelInfo, Reading, SceneOptions, Stats, Timing } from "./index.js";
 
 export interface TissueOptions {
   /** By default: the bundle's step for frames, a budget of 30 % of it, a guard that reports. */
@@ -21,6 +21,7 @@ export interface Frame {
   /** Of the last step. */
   readings: Reading[];
   stats: Stats;
+  timing: Timing;
   /** That the frame took to make. */
   frameMs: number;
   recording: boolean;

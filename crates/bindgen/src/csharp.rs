@@ -44,7 +44,10 @@ fn structure(out: &mut String, source: &Source, item: &Struct) -> Result<()> {
     summary(out, 4, &item.doc);
     out.push_str("    [StructLayout(LayoutKind.Sequential)]\n");
     writeln!(out, "    public unsafe struct {}\n    {{", item.name)?;
-    for Named { doc, name, kind } in &item.fields {
+    for Named {
+        doc, name, kind, ..
+    } in &item.fields
+    {
         summary(out, 8, doc);
         match kind {
             Kind::Array(element, length) => {

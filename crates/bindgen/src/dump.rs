@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! const UPT_OK = 0
-//! fn upt_model_close(upt_model*) -> i32
+//! fn upt_model_destroy(upt_model*) -> i32
 //! struct upt_view 64
 //! field upt_view.kind @4 i32
 //! ```

@@ -3,6 +3,7 @@
 
 pub mod csharp;
 pub mod dump;
+pub mod enumerations;
 pub mod python;
 pub mod reference;
 pub mod source;
@@ -36,7 +37,7 @@ pub fn outputs() -> Result<Vec<Output>> {
     Ok(vec![
         Output {
             path: "include/upt.h",
-            text: header(&root)?,
+            text: header(&root, &source)?,
         },
         Output {
             path: "unity-plugin/Runtime/Interop/Native.g.cs",
@@ -58,9 +59,13 @@ pub fn outputs() -> Result<Vec<Output>> {
 }
 
 /// `include/upt.h`.
-fn header(root: &Path) -> Result<String> {
-    let config =
+fn header(root: &Path, source: &source::Source) -> Result<String> {
+    let mut config =
         cbindgen::Config::from_file(root.join("cbindgen.toml")).map_err(anyhow::Error::msg)?;
+    config.after_includes = Some(enumerations::write(source)?);
+    let types = source.enumerations.iter().map(|one| one.name.clone());
+    let values = source.constants.iter().filter(|one| one.of.is_some());
+    config.export.exclude = types.chain(values.map(|one| one.name.clone())).collect();
     let mut builder = cbindgen::Builder::new().with_config(config);
     for file in source::FILES {
         builder = builder.with_src(root.join(source::FOLDER).join(file));

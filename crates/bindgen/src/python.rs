@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from enum import IntEnum, IntFlag
 from typing import Any, TypedDict
 
-from upt._record import Record, boolean, choice, numbers, switch, text, vector
+from upt._record import Record, boolean, choice, corrections, numbers, switch, text, vector
 
 ";
 
@@ -27,13 +27,13 @@ from upt._record import Record, boolean, choice, numbers, switch, text, vector
 pub fn write(source: &Source) -> Result<String> {
     let mut out = String::from(HEAD);
     for constant in &source.constants {
-        if group(&constant.name).is_none() {
+        if constant.of.is_none() {
             let name = constant.name.trim_start_matches("UPT_");
             writeln!(out, "{name} = {}", constant.value)?;
             docstring(&mut out, 0, &constant.doc);
         }
     }
-    enums(&mut out, &source.constants)?;
+    enums(&mut out, source)?;
     for item in &source.structs {
         structure(&mut out, source, item)?;
         if item.name.ends_with("_options") {
@@ -50,22 +50,6 @@ pub fn write(source: &Source) -> Result<String> {
     Ok(out)
 }
 
-/// The enum of a constant: `UPT_KERNEL_AUTO` belongs to `Kernel`.
-fn group(constant: &str) -> Option<String> {
-    let name = constant.strip_prefix("UPT_")?;
-    let first = name.split('_').next()?;
-    Some(match first {
-        "OK" | "PENDING" | "ERR" => "Status".into(),
-        "ABI" => return None,
-        "GUARD" => "GuardPolicy".into(),
-        "LOG" => "LogLevel".into(),
-        "SET" => "IndexSet".into(),
-        "STEP" => "StepPath".into(),
-        "VIEW" => "ViewKind".into(),
-        _ => camel(&first.to_lowercase()),
-    })
-}
-
 /// `upt_scene_stats` is `SceneStats`.
 fn camel(name: &str) -> String {
     let words = name.trim_start_matches("upt_").split('_');
@@ -77,24 +61,20 @@ fn camel(name: &str) -> String {
         .collect()
 }
 
-fn enums(out: &mut String, constants: &[Constant]) -> Result<()> {
-    let mut names: Vec<String> = Vec::new();
-    for name in constants.iter().filter_map(|c| group(&c.name)) {
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
-    for name in names {
+fn enums(out: &mut String, source: &Source) -> Result<()> {
+    for one in &source.enumerations {
+        let name = camel(&one.name);
         let base = if name == "Flag" { "IntFlag" } else { "IntEnum" };
-        let members: Vec<&Constant> = constants
-            .iter()
-            .filter(|c| group(&c.name).as_deref() == Some(&name))
-            .collect();
+        let members: Vec<&Constant> = source.values(&one.name).collect();
         writeln!(out, "\n\nclass {name}({base}):")?;
         let of = members[0].name.trim_start_matches("UPT_");
         let prefix = of.split('_').next().unwrap_or(of);
         let prefix = if name == "Status" { "ERR" } else { prefix };
-        writeln!(out, "    \"\"\"`UPT_{prefix}_*`.\"\"\"\n")?;
+        writeln!(
+            out,
+            "    \"\"\"`UPT_{prefix}_*`. {}\"\"\"\n",
+            one.doc.join("\n    ")
+        )?;
         for constant in members {
             let member = constant.name.trim_start_matches("UPT_");
             let member = member.strip_prefix(&format!("{prefix}_")).unwrap_or(member);
@@ -127,26 +107,22 @@ fn seen(source: &Source, item: &Struct, field: &Named) -> Result<Seen> {
         raw: raw.clone(),
     };
     Ok(match &field.kind {
-        Kind::Number(number)
-            if number == "u8" && field.doc.iter().any(|line| line.contains("1: ")) =>
-        {
-            of("bool", "bool", Some(format!("boolean(\"_{name}\")")))
-        }
-        Kind::Number(number) if number.starts_with('f') => of("float", "float", None),
-        // Microseconds may be mentioned next to an enum and are not part of it.
-        Kind::Number(number) if number == "u32" && name.ends_with("_us") => of("int", "int", None),
-        Kind::Number(number) => match named_enum(source, &field.doc) {
+        Kind::Number(number) => match field.of.as_deref().map(camel) {
             Some(class) if class == "Switch" => of(
                 "bool | None",
                 "bool | None",
                 Some(format!("switch(\"_{name}\")")),
             ),
-            Some(class) if matches!(number.as_str(), "u8" | "i32" | "u32") => of(
+            Some(class) => of(
                 &class,
                 &format!("{class} | str | int"),
                 Some(format!("choice(\"_{name}\", {class})")),
             ),
-            _ => of("int", "int", None),
+            None if number.starts_with('f') => of("float", "float", None),
+            None if number == "u8" && field.doc.iter().any(|line| line.contains("1: ")) => {
+                of("bool", "bool", Some(format!("boolean(\"_{name}\")")))
+            }
+            None => of("int", "int", None),
         },
         Kind::Array(element, _) => {
             let element = match element.as_ref() {
@@ -170,7 +146,7 @@ fn seen(source: &Source, item: &Struct, field: &Named) -> Result<Seen> {
                 if !item.fields.iter().any(|other| other.name == count) {
                     bail!("{}.{name}: a pointer without {count}", item.name);
                 }
-                let class = named_enum(source, &field.doc).unwrap_or_else(|| {
+                let class = field.of.as_deref().map(camel).unwrap_or_else(|| {
                     (if number.starts_with('f') {
                         "float"
                     } else {
@@ -189,18 +165,13 @@ fn seen(source: &Source, item: &Struct, field: &Named) -> Result<Seen> {
             }
             _ => of("int | None", "int | None", None),
         },
+        Kind::Named(_) if raw == "Corrections" => of(
+            &raw,
+            "Corrections | str | int",
+            Some(format!("corrections(\"_{name}\", {raw})")),
+        ),
         Kind::Named(_) => of(&raw, &raw, None),
     })
-}
-
-/// The enum that a field's documentation names, as in "`UPT_KERNEL_*`: who decodes."
-fn named_enum(source: &Source, doc: &Doc) -> Option<String> {
-    let text = doc.join(" ");
-    let start = text.find("`UPT_")? + 1;
-    let constant = text[start..].split('`').next()?;
-    let class = group(constant)?;
-    let known = |c: &Constant| group(&c.name).as_deref() == Some(&class);
-    source.constants.iter().any(known).then_some(class)
 }
 
 fn structure(out: &mut String, source: &Source, item: &Struct) -> Result<()> {

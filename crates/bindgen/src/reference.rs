@@ -148,10 +148,11 @@ fn fields(text: &mut String, one: &Struct) -> Result<()> {
         prose(&one.doc)
     )?;
     for field in &one.fields {
-        let (kind, length) = match &field.kind {
-            Kind::Array(kind, length) => (c_type(kind), format!("[{length}]")),
-            kind => (c_type(kind), String::new()),
+        let length = match &field.kind {
+            Kind::Array(_, length) => format!("[{length}]"),
+            _ => String::new(),
         };
+        let kind = named_type(field);
         writeln!(
             text,
             "| `{}` | `{}{length}` | {} |",
@@ -203,7 +204,20 @@ fn prose(doc: &Doc) -> String {
 }
 
 fn declared(parameter: &Named) -> String {
-    format!("{}{}", c_type(&parameter.kind), parameter.name)
+    format!("{}{}", named_type(parameter), parameter.name)
+}
+
+/// The type of a field or a parameter: an enumeration's own name for its integer.
+fn named_type(one: &Named) -> String {
+    let mut kind = one.kind.clone();
+    let mut at = &mut kind;
+    while let Kind::Pointer(inner, _) | Kind::Array(inner, _) = at {
+        at = inner;
+    }
+    if let Some(name) = &one.of {
+        *at = Kind::Named(name.clone());
+    }
+    c_type(&kind)
 }
 
 /// A type with the space or star that stands before the name.

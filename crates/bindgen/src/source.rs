@@ -34,10 +34,20 @@ pub const FILES: [&str; 19] = [
 /// A doc comment's lines.
 pub type Doc = Vec<String>;
 
-/// `pub const NAME: i32 = VALUE;`
+/// `pub type NAME = i32;`, whose values are the constants of this type.
+pub struct Enumeration {
+    pub doc: Doc,
+    pub name: String,
+    /// The Rust name of its integer.
+    pub number: String,
+}
+
+/// `pub const NAME: TYPE = VALUE;`
 pub struct Constant {
     pub doc: Doc,
     pub name: String,
+    /// The enumeration that it is one of.
+    pub of: Option<String>,
     pub unsigned: bool,
     pub value: String,
 }
@@ -60,6 +70,8 @@ pub struct Named {
     pub doc: Doc,
     pub name: String,
     pub kind: Kind,
+    /// The enumeration that its numbers are of.
+    pub of: Option<String>,
 }
 
 /// A `repr(C)` struct.
@@ -82,6 +94,7 @@ pub struct Function {
 /// The whole ABI.
 #[derive(Default)]
 pub struct Source {
+    pub enumerations: Vec<Enumeration>,
     pub constants: Vec<Constant>,
     pub opaque: Vec<String>,
     pub structs: Vec<Struct>,
@@ -107,6 +120,15 @@ pub fn read(root: &Path) -> Result<Source> {
 impl Source {
     fn add(&mut self, file: &'static str, item: &Item) -> Result<()> {
         match item {
+            Item::Type(item) if is_public(&item.vis) => {
+                if let Ok(Kind::Number(number)) = self.kind(&item.ty) {
+                    self.enumerations.push(Enumeration {
+                        doc: doc(&item.attrs),
+                        name: item.ident.to_string(),
+                        number,
+                    });
+                }
+            }
             Item::Const(item) if is_public(&item.vis) => {
                 let value = match item.expr.as_ref() {
                     Expr::Lit(literal) => integer(&literal.lit)?,
@@ -119,7 +141,8 @@ impl Source {
                 self.constants.push(Constant {
                     doc: doc(&item.attrs),
                     name: item.ident.to_string(),
-                    unsigned: kind(&item.ty)? == Kind::Number("u32".into()),
+                    of: self.enumeration(&item.ty),
+                    unsigned: self.kind(&item.ty)? == Kind::Number("u32".into()),
                     value,
                 });
             }
@@ -128,7 +151,8 @@ impl Source {
                     Ok(Named {
                         doc: doc(&field.attrs),
                         name: field.ident.as_ref().context("tuple struct")?.to_string(),
-                        kind: kind(&field.ty)?,
+                        kind: self.kind(&field.ty)?,
+                        of: self.enumeration(&field.ty),
                     })
                 });
                 self.structs.push(Struct {
@@ -149,7 +173,8 @@ impl Source {
                     Ok(Named {
                         doc: Doc::new(),
                         name: name.ident.to_string(),
-                        kind: kind(&input.ty)?,
+                        kind: self.kind(&input.ty)?,
+                        of: self.enumeration(&input.ty),
                     })
                 });
                 self.functions.push(Function {
@@ -159,13 +184,74 @@ impl Source {
                     parameters: parameters.collect::<Result<_>>()?,
                     result: match &item.sig.output {
                         ReturnType::Default => None,
-                        ReturnType::Type(_, result) => Some(kind(result)?),
+                        ReturnType::Type(_, result) => Some(self.kind(result)?),
                     },
                 });
             }
             _ => {}
         }
         Ok(())
+    }
+}
+
+impl Source {
+    /// The values of an enumeration, in their order.
+    pub fn values<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Constant> {
+        self.constants
+            .iter()
+            .filter(move |one| one.of.as_deref() == Some(name))
+    }
+
+    /// The enumeration that a type names, behind pointers and in arrays, too.
+    fn enumeration(&self, ty: &Type) -> Option<String> {
+        match ty {
+            Type::Ptr(pointer) => self.enumeration(&pointer.elem),
+            Type::Array(array) => self.enumeration(&array.elem),
+            Type::Path(path) => {
+                let name = path.path.segments.last()?.ident.to_string();
+                self.number(&name).map(|_| name)
+            }
+            _ => None,
+        }
+    }
+
+    /// The integer of an enumeration.
+    fn number(&self, name: &str) -> Option<String> {
+        let found = self.enumerations.iter().find(|one| one.name == name);
+        found.map(|one| one.number.clone())
+    }
+
+    fn kind(&self, ty: &Type) -> Result<Kind> {
+        Ok(match ty {
+            Type::Ptr(pointer) => Kind::Pointer(
+                Box::new(self.kind(&pointer.elem)?),
+                pointer.mutability.is_none(),
+            ),
+            Type::Array(array) => {
+                let Expr::Lit(length) = &array.len else {
+                    bail!("array length")
+                };
+                Kind::Array(
+                    Box::new(self.kind(&array.elem)?),
+                    integer(&length.lit)?.parse()?,
+                )
+            }
+            Type::Path(path) => {
+                let name = path
+                    .path
+                    .segments
+                    .last()
+                    .context("empty path")?
+                    .ident
+                    .to_string();
+                match (name.as_str(), self.number(&name)) {
+                    (_, Some(number)) => Kind::Number(number),
+                    ("u8" | "i32" | "u32" | "u64" | "f32" | "f64", _) => Kind::Number(name),
+                    _ => Kind::Named(name),
+                }
+            }
+            _ => bail!("a type that cannot cross the C ABI"),
+        })
     }
 }
 
@@ -205,33 +291,4 @@ fn doc(attributes: &[Attribute]) -> Doc {
             },
         )
         .collect()
-}
-
-fn kind(ty: &Type) -> Result<Kind> {
-    Ok(match ty {
-        Type::Ptr(pointer) => {
-            Kind::Pointer(Box::new(kind(&pointer.elem)?), pointer.mutability.is_none())
-        }
-        Type::Array(array) => {
-            let Expr::Lit(length) = &array.len else {
-                bail!("array length")
-            };
-            Kind::Array(Box::new(kind(&array.elem)?), integer(&length.lit)?.parse()?)
-        }
-        Type::Path(path) => {
-            let name = path
-                .path
-                .segments
-                .last()
-                .context("empty path")?
-                .ident
-                .to_string();
-            match name.as_str() {
-                "u8" | "i32" | "u32" | "u64" | "f32" | "f64" => Kind::Number(name),
-                "upt_status" => Kind::Number("i32".into()),
-                _ => Kind::Named(name),
-            }
-        }
-        _ => bail!("a type that cannot cross the C ABI"),
-    })
 }

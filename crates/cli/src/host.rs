@@ -113,7 +113,7 @@ impl std::fmt::Display for NoRuntime {
 impl std::error::Error for NoRuntime {}
 
 impl Model {
-    /// `upt_model_open`.
+    /// `upt_model_create`.
     pub fn open(path: &Path, settings: &ModelSettings) -> Result<Self> {
         let text = path
             .to_str()
@@ -132,7 +132,7 @@ impl Model {
                 options.fallback = ffi::UPT_SWITCH_OFF as u8;
             }
             let mut handle = std::ptr::null_mut();
-            check(ffi::upt_model_open(text.as_ptr(), &options, &mut handle))?;
+            check(ffi::upt_model_create(text.as_ptr(), &options, &mut handle))?;
             let mut info: ffi::upt_model_info = zeroed();
             info.struct_size = size::<ffi::upt_model_info>();
             let mut model = Self {
@@ -143,7 +143,7 @@ impl Model {
                 handle,
                 info,
             };
-            check(ffi::upt_model_get_info(handle, &mut model.info))?;
+            check(ffi::upt_model_read_info(handle, &mut model.info))?;
             Ok(model)
         }
     }
@@ -172,14 +172,14 @@ impl Model {
         self
     }
 
-    /// `upt_model_indices` of a `UPT_SET_*`.
+    /// `upt_model_read_indices` of a `UPT_SET_*`.
     pub fn indices(&self, set: i32) -> Result<Vec<u32>> {
         let mut needed = 0;
         // SAFETY: a NULL buffer of capacity 0 asks for the count; the second call has that capacity.
         unsafe {
-            ffi::upt_model_indices(self.handle, set, std::ptr::null_mut(), 0, &mut needed);
+            ffi::upt_model_read_indices(self.handle, set, std::ptr::null_mut(), 0, &mut needed);
             let mut out = vec![0u32; needed as usize];
-            check(ffi::upt_model_indices(
+            check(ffi::upt_model_read_indices(
                 self.handle,
                 set,
                 out.as_mut_ptr(),
@@ -190,12 +190,16 @@ impl Model {
         }
     }
 
-    /// `upt_model_positions`: rest positions, mm.
+    /// `upt_model_read_positions`: rest positions, mm.
     pub fn positions(&self) -> Result<Vec<[f32; 3]>> {
         let mut out = vec![[0.0; 3]; self.info.node_count as usize];
         // SAFETY: pointer and count describe `out`.
         check(unsafe {
-            ffi::upt_model_positions(self.handle, out.as_mut_ptr().cast(), 3 * out.len() as u64)
+            ffi::upt_model_read_positions(
+                self.handle,
+                out.as_mut_ptr().cast(),
+                3 * out.len() as u64,
+            )
         })?;
         Ok(out)
     }
@@ -203,7 +207,7 @@ impl Model {
 
 impl Drop for Model {
     fn drop(&mut self) {
-        // SAFETY: the handle came from upt_model_open and is closed once.
-        unsafe { ffi::upt_model_close(self.handle) };
+        // SAFETY: the handle came from upt_model_create and is closed once.
+        unsafe { ffi::upt_model_destroy(self.handle) };
     }
 }

@@ -116,7 +116,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
 /// Sums over the contact nodes of a step, mN.
 #[derive(serde::Serialize)]
 struct Forces {
-    /// `upt_scene_contact_force`.
+    /// `upt_scene_read_contact_force`.
     found: [f64; 3],
     /// The trajectory's.
     wanted: [f64; 3],

@@ -134,6 +134,11 @@ impl Surrogate {
         self.scene.stats()
     }
 
+    /// How long it took.
+    pub fn timing(&self) -> Result<ffi::upt_scene_timing> {
+        self.scene.timing()
+    }
+
     /// Estimated error of the last corrected step, root mean square over all nodes, mm; none without corrections.
     pub fn estimated_mm(&self) -> Result<Option<f32>> {
         let stats = self.scene.stats()?;

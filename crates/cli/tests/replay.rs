@@ -20,7 +20,7 @@ fn upt(file: &Path, more: &[&str], isa: Option<&str>) -> Output {
 /// A ball that goes down at a place of the surface, a cut, and gravity.
 fn inputs() -> String {
     let mut text = String::from(
-        r#"{"upt_replay":1,"bundle":"liver-coarse","portable":true,"scene":{"step_s":0.02,"corrections":3}}"#,
+        r#"{"upt_replay":1,"bundle":"liver-coarse","portable":true,"scene":{"step_s":0.02,"corrections":{"mode":"count","count":3}}}"#,
     );
     let model = upt::Model::open(
         Path::new("../../onnx/liver-coarse"),

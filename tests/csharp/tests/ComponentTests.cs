@@ -294,7 +294,7 @@ namespace Upt.Tests
                 FinishStep(sample.Tissue);
                 if (sample.Tissue.LastStats.step_count == last) continue;
                 last = sample.Tissue.LastStats.step_count;
-                told += sample.Tissue.LastStats.step_ms;
+                told += sample.Tissue.LastTiming.step_ms;
             }
             item.SetActive(false);
             Assert.That(told, Is.GreaterThan(0.0));
@@ -380,7 +380,7 @@ namespace Upt.Tests
             tissue.gameObject.SetActive(true);
             Assert.That(tissue.IsRunning, Is.False);
             Assert.That(Debug.Errors, Has.Count.EqualTo(1));
-            Assert.That(Debug.Errors[0], Is.StringContaining("corrections_target_mm"));
+            Assert.That(Debug.Errors[0], Is.StringContaining("corrections.target_mm"));
         }
     }
 }

@@ -28,7 +28,7 @@ namespace Upt.Tests
             string bundle = Environment.GetEnvironmentVariable("UPT_TEST_CORRECTED");
             Assert.That(bundle, Is.Not.Null.And.Not.Empty, "UPT_TEST_CORRECTED is not set: run tests/csharp/run.sh");
             using (Model model = new Model(bundle, 1))
-            using (Scene scene = new Scene(model, new upt_scene_options { corrections = 5 }))
+            using (Scene scene = new Scene(model, new upt_scene_options { corrections = Corrections.Count(5) }))
             {
                 float[] rest = model.Positions();
                 float[] blade = Blade(rest);

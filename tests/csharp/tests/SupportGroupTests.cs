@@ -58,7 +58,7 @@ namespace Upt.Tests
         public void AGroupGoesWhereItIsLedAndIsLetGo()
         {
             using (Model model = new Model(folder, 1))
-            using (Scene scene = new Scene(model, new upt_scene_options { corrections = 5 }))
+            using (Scene scene = new Scene(model, new upt_scene_options { corrections = Corrections.Count(5) }))
             {
                 Assert.That(model.SupportNodes(0), Is.EqualTo(held));
                 Assert.Throws<UptException>(() => model.SupportNodes(1));

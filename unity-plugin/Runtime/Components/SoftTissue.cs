@@ -86,8 +86,11 @@ namespace Upt
         private bool refused;
         private bool failed;
 
-        /// <summary>Statistics of the last finished step: stage times in ms, envelope flags.</summary>
+        /// <summary>Statistics of the last finished step, envelope flags among them.</summary>
         public upt_scene_stats LastStats { get; private set; }
+
+        /// <summary>What the last finished step and its stages took, ms.</summary>
+        public upt_scene_timing LastTiming { get; private set; }
 
         /// <summary>Whether the model solves the contact of instruments. Others (models without a linear response) take the
         /// nodes that instruments touch, and have no readings.</summary>
@@ -231,7 +234,7 @@ namespace Upt
             scene.Reset();
             readingCount = 0;
             contactCount = 0;
-            LastStats = scene.Stats();
+            ReadStats();
             playhead = new Playhead(playhead.Step);
             clock = new FrameClock(playhead.Step);
             Heal();
@@ -257,8 +260,7 @@ namespace Upt
             if (stepSeconds != 0f) step = stepSeconds;
             scene = new Scene(native, new upt_scene_options {
                 interpolate_points = 1,
-                corrections = corrections,
-                corrections_target_mm = correctionsTarget,
+                corrections = Corrections.Of(corrections, correctionsTarget),
                 substeps = (byte)substeps,
                 damping_per_s = damping,
                 step_s = step,
@@ -275,9 +277,15 @@ namespace Upt
             clock = new FrameClock(step);
             now = 0.0;
             presents = solvesContact && surface.TryPresent(scene);
-            LastStats = scene.Stats();
+            ReadStats();
             filter.sharedMesh = surface.Mesh;
             BeginSupports();
+        }
+
+        private void ReadStats()
+        {
+            LastStats = scene.Stats();
+            LastTiming = scene.Timing();
         }
 
         private void Close()
@@ -366,7 +374,7 @@ namespace Upt
         {
             for (int made = 0; made < MostMade && !inFlight && clock.IsBehind(now); made++)
             {
-                if (LastStats.step_ms > 500.0 * clock.Step) return;
+                if (LastTiming.step_ms > 500.0 * clock.Step) return;
                 using (ContactMarker.Auto())
                 {
                     Operate();
@@ -418,14 +426,14 @@ namespace Upt
             inFlight = false;
             refused = false;
             clock.Finished();
-            LastStats = scene.Stats();
+            ReadStats();
             if (solvesContact)
             {
                 scene.Readings(readings, submittedCount);
                 readingCount = submittedCount;
                 contactCount = scene.InstrumentContacts(ref pushes);
             }
-            StepCounters.Add(LastStats);
+            StepCounters.Add(LastTiming);
             playhead.Landed();
         }
 
@@ -433,7 +441,7 @@ namespace Upt
         /// One line for a run of refusals.</summary>
         private void Hold(UptException error)
         {
-            LastStats = scene.Stats();
+            ReadStats();
             playhead.Refused();
             if (!refused) Debug.LogWarning("libupt: soft tissue '" + name + "' holds its last state: " + error.Message, this);
             refused = true;

@@ -20,16 +20,16 @@ namespace Upt
         private static ProfilerCounterValue<long> guard = Counter("libupt Guard");
 
         /// <summary>Adds a finished step. Allocates nothing.</summary>
-        public static void Add(upt_scene_stats stats)
+        public static void Add(upt_scene_timing timing)
         {
-            step.Value += Nanoseconds(stats.step_ms);
-            prior.Value += Nanoseconds(stats.prior_ms);
-            encode.Value += Nanoseconds(stats.encode_ms);
-            aggregate.Value += Nanoseconds(stats.aggregate_ms);
-            latent.Value += Nanoseconds(stats.latent_ms);
-            decode.Value += Nanoseconds(stats.decode_ms);
-            corrections.Value += Nanoseconds(stats.corrections_ms);
-            guard.Value += Nanoseconds(stats.guard_ms);
+            step.Value += Nanoseconds(timing.step_ms);
+            prior.Value += Nanoseconds(timing.prior_ms);
+            encode.Value += Nanoseconds(timing.encode_ms);
+            aggregate.Value += Nanoseconds(timing.aggregate_ms);
+            latent.Value += Nanoseconds(timing.latent_ms);
+            decode.Value += Nanoseconds(timing.decode_ms);
+            corrections.Value += Nanoseconds(timing.corrections_ms);
+            guard.Value += Nanoseconds(timing.guard_ms);
         }
 
         private static ProfilerCounterValue<long> Counter(string name)

@@ -18,7 +18,7 @@ namespace Upt.Interop
 
         protected override bool ReleaseHandle()
         {
-            return Native.upt_model_close(handle) == Native.UPT_OK;
+            return Native.upt_model_destroy(handle) == Native.UPT_OK;
         }
     }
 

@@ -29,12 +29,12 @@ namespace Upt.Interop
             IntPtr pointer = IntPtr.Zero;
             fixed (byte* bytes = Utf8.Encode(path, "path"))
             {
-                Status.Check(Native.upt_model_open(bytes, &options, &pointer));
+                Status.Check(Native.upt_model_create(bytes, &options, &pointer));
             }
             handle = new ModelHandle(pointer);
             upt_model_info info = default(upt_model_info);
             info.struct_size = (uint)sizeof(upt_model_info);
-            int status = Native.upt_model_get_info(pointer, &info);
+            int status = Native.upt_model_read_info(pointer, &info);
             if (status < 0) handle.Dispose();
             Status.Check(status);
             Info = info;
@@ -61,7 +61,7 @@ namespace Upt.Interop
             {
                 fixed (float* pointer = positions)
                 {
-                    Status.Check(Native.upt_model_positions(handle.DangerousGetHandle(), pointer,
+                    Status.Check(Native.upt_model_read_positions(handle.DangerousGetHandle(), pointer,
                                                             (ulong)positions.Length));
                 }
             }
@@ -81,12 +81,12 @@ namespace Upt.Interop
             try
             {
                 ulong needed = 0;
-                Status.Check(Native.upt_model_indices(handle.DangerousGetHandle(), set, null, 0, &needed));
+                Status.Check(Native.upt_model_read_indices(handle.DangerousGetHandle(), set, null, 0, &needed));
                 uint[] indices = new uint[needed];
                 if (needed == 0) return indices;
                 fixed (uint* pointer = indices)
                 {
-                    Status.Check(Native.upt_model_indices(handle.DangerousGetHandle(), set, pointer, needed,
+                    Status.Check(Native.upt_model_read_indices(handle.DangerousGetHandle(), set, pointer, needed,
                                                           &needed));
                 }
                 return indices;
@@ -119,12 +119,12 @@ namespace Upt.Interop
             {
                 IntPtr model = handle.DangerousGetHandle();
                 ulong needed = 0;
-                Status.Check(region ? Native.upt_model_region(model, at, null, 0, null, 0, &needed)
-                                    : Native.upt_model_support(model, at, null, 0, null, 0, &needed));
+                Status.Check(region ? Native.upt_model_read_region(model, at, null, 0, null, 0, &needed)
+                                    : Native.upt_model_read_support(model, at, null, 0, null, 0, &needed));
                 uint[] nodes = new uint[needed];
                 fixed (uint* to = nodes)
-                    Status.Check(region ? Native.upt_model_region(model, at, null, 0, to, needed, &needed)
-                                        : Native.upt_model_support(model, at, null, 0, to, needed, &needed));
+                    Status.Check(region ? Native.upt_model_read_region(model, at, null, 0, to, needed, &needed)
+                                        : Native.upt_model_read_support(model, at, null, 0, to, needed, &needed));
                 return nodes;
             }
             finally

@@ -17,7 +17,7 @@ namespace Upt.Interop
         public byte* onnxruntime_path;
     }
 
-    /// <summary>Options of `upt_model_open`.</summary>
+    /// <summary>Options of `upt_model_create`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_model_options
     {
@@ -49,7 +49,7 @@ namespace Upt.Interop
         public IntPtr user_stream;
     }
 
-    /// <summary>What a model is; filled by `upt_model_get_info`.</summary>
+    /// <summary>What a model is; filled by `upt_model_read_info`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_model_info
     {
@@ -79,13 +79,27 @@ namespace Upt.Interop
         public int precision;
         /// <summary>Host memory of the model.</summary>
         public ulong memory_bytes;
-        /// <summary>Wall time of `upt_model_open`.</summary>
+        /// <summary>Wall time of `upt_model_create`.</summary>
         public double load_seconds;
         /// <summary>
         /// The `step_s` of `upt_scene_options` that the bundle recommends to a host that shows frames (`upt_scene_present`), seconds; `dt` where it
         /// recommends no other. For scenes with the corrections that the bundle recommends.
         /// </summary>
         public double frame_step_s;
+    }
+
+    /// <summary>How many corrections by the elements a step gets while there is contact, in `upt_scene_options`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_corrections
+    {
+        /// <summary>`UPT_CORRECTIONS_*`.</summary>
+        public int mode;
+        /// <summary>With `UPT_CORRECTIONS_COUNT` 1 to 64; otherwise 0.</summary>
+        public uint count;
+        /// <summary>No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.</summary>
+        public uint budget_us;
+        /// <summary>Corrections stop once the estimated error is below this, mm; 0: no target. Only with `UPT_CORRECTIONS_COUNT` and `UPT_CORRECTIONS_AUTO`.</summary>
+        public float target_mm;
     }
 
     /// <summary>Options of `upt_scene_create`.</summary>
@@ -104,8 +118,8 @@ namespace Upt.Interop
         public int guard_policy;
         /// <summary>A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's.</summary>
         public byte* mesh_path;
-        /// <summary>1: do not enforce held and contact nodes.</summary>
-        public byte free_boundary;
+        /// <summary>`UPT_SWITCH_*`: held nodes and nodes in contact are where they belong, usually on; off: where the networks put them.</summary>
+        public byte boundary;
         /// <summary>`UPT_SWITCH_*`: tissue at rest sleeps, usually on.</summary>
         public byte sleep;
         /// <summary>1: the guard looks for inverted elements in each step.</summary>
@@ -125,15 +139,8 @@ namespace Upt.Interop
         public fixed byte reserved[1];
         /// <summary>`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.</summary>
         public int step_path;
-        /// <summary>
-        /// Corrections by the elements while there is contact: 1 to 64 a step, 0 as many as the bundle recommends,
-        /// `UPT_CORRECTIONS_NONE`, or `UPT_CORRECTIONS_AUTO` for up to 64. A count with a budget or a target is the most that a step gets.
-        /// </summary>
-        public int corrections;
-        /// <summary>No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.</summary>
-        public uint corrections_budget_us;
-        /// <summary>Corrections stop once the estimated error is below this, mm; 0: no target. Only with a count or `UPT_CORRECTIONS_AUTO`.</summary>
-        public float corrections_target_mm;
+        /// <summary>Corrections by the elements while there is contact; all zero: as many as the bundle recommends.</summary>
+        public upt_corrections corrections;
         /// <summary>`UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never.</summary>
         public float error_limit_mm;
         /// <summary>
@@ -226,7 +233,7 @@ namespace Upt.Interop
         public fixed float angular_stiffness_n_m_per_rad[9];
     }
 
-    /// <summary>What the last step did and cost; filled by `upt_scene_get_stats`.</summary>
+    /// <summary>What the last step did; filled by `upt_scene_read_stats`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_scene_stats
     {
@@ -236,22 +243,6 @@ namespace Upt.Interop
         public uint flags;
         /// <summary>Steps since creation or reset.</summary>
         public ulong step_count;
-        /// <summary>The whole step, ms; the stages follow.</summary>
-        public double step_ms;
-        /// <summary>Input checks, ms.</summary>
-        public double check_ms;
-        /// <summary>Contact solve and linear response, ms.</summary>
-        public double prior_ms;
-        /// <summary>Encoder, ms.</summary>
-        public double encode_ms;
-        /// <summary>Message mean, ms.</summary>
-        public double aggregate_ms;
-        /// <summary>Latent network, or the whole step's graph, ms.</summary>
-        public double latent_ms;
-        /// <summary>Decoder, ms.</summary>
-        public double decode_ms;
-        /// <summary>Guard and publishing, ms.</summary>
-        public double guard_ms;
         /// <summary>Nodes decoded in the last step.</summary>
         public ulong decoded_node_count;
         /// <summary>Contact nodes of the last step.</summary>
@@ -274,22 +265,16 @@ namespace Upt.Interop
         public byte sleeping;
         /// <summary>1: a bug was caught in an earlier call; only destroy is left.</summary>
         public byte poisoned;
-        /// <summary>1: `upt_scene_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.</summary>
+        /// <summary>1: `upt_scene_read_contact_force` gives the contact forces of the linear response; 0: the elements' elastic forces.</summary>
         public byte prior_forces;
         /// <summary>Substeps of the last step; 0 if it was not split.</summary>
         public byte substeps;
         /// <summary>Zero.</summary>
         public fixed byte reserved[4];
-        /// <summary>Part of the stages' times: copies to a device, ms; 0 on the CPU.</summary>
-        public double upload_ms;
-        /// <summary>Part of the stages' times: copies back from a device, ms; 0 on the CPU.</summary>
-        public double download_ms;
         /// <summary>`UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.</summary>
         public int step_path;
         /// <summary>Corrections made in the last step.</summary>
         public uint corrections;
-        /// <summary>Corrections, ms.</summary>
-        public double corrections_ms;
         /// <summary>Evaluations of the element forces in the last step.</summary>
         public uint evaluations;
         /// <summary>Residual force after the corrections divided by that before them; 0 without corrections.</summary>
@@ -298,8 +283,42 @@ namespace Upt.Interop
         public float error_mm;
         /// <summary>Smallest det F of the corrected state; without corrections, of the elements at the contact; 0 if there are neither.</summary>
         public float min_det;
+    }
+
+    /// <summary>What the last step took, in milliseconds; filled by `upt_scene_read_timing`.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_scene_timing
+    {
+        /// <summary>`sizeof(upt_scene_timing)`, set by the caller.</summary>
+        public uint struct_size;
+        /// <summary>Zero.</summary>
+        public fixed byte reserved[4];
+        /// <summary>Steps since creation or reset, the last of which this is of: as in `upt_scene_stats`.</summary>
+        public ulong step_count;
+        /// <summary>The whole step, ms; the stages follow.</summary>
+        public double step_ms;
+        /// <summary>Input checks, ms.</summary>
+        public double check_ms;
+        /// <summary>Contact solve and linear response, ms.</summary>
+        public double prior_ms;
+        /// <summary>Encoder, ms.</summary>
+        public double encode_ms;
+        /// <summary>Message mean, ms.</summary>
+        public double aggregate_ms;
+        /// <summary>Latent network, or the whole step's graph, ms.</summary>
+        public double latent_ms;
+        /// <summary>Decoder, ms.</summary>
+        public double decode_ms;
+        /// <summary>Guard and publishing, ms.</summary>
+        public double guard_ms;
+        /// <summary>Corrections, ms.</summary>
+        public double corrections_ms;
         /// <summary>Contact solves of instruments, ms; part of `corrections_ms`, or of `check_ms` without corrections.</summary>
         public double contact_ms;
+        /// <summary>Part of the stages' times: copies to a device, ms; 0 on the CPU.</summary>
+        public double upload_ms;
+        /// <summary>Part of the stages' times: copies back from a device, ms; 0 on the CPU.</summary>
+        public double download_ms;
     }
 
     /// <summary>
@@ -428,7 +447,7 @@ namespace Upt.Interop
         public fixed byte reserved[3];
     }
 
-    /// <summary>What a tie does at the end of a step; filled by `upt_scene_tie_readings`.</summary>
+    /// <summary>What a tie does at the end of a step; filled by `upt_scene_read_ties`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_tie_reading
     {
@@ -516,7 +535,7 @@ namespace Upt.Interop
         public IntPtr hull;
     }
 
-    /// <summary>What the tissue does to an instrument at the end of a step; filled by `upt_scene_instrument_readings`.</summary>
+    /// <summary>What the tissue does to an instrument at the end of a step; filled by `upt_scene_read_instruments`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_instrument_reading
     {
@@ -538,7 +557,7 @@ namespace Upt.Interop
         public float residual_mm;
     }
 
-    /// <summary>A point of the surface that pushes or holds an instrument; filled by `upt_scene_instrument_contacts`.</summary>
+    /// <summary>A point of the surface that pushes or holds an instrument; filled by `upt_scene_read_instrument_contacts`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_instrument_contact
     {
@@ -611,7 +630,7 @@ namespace Upt.Interop
         public ulong changed_count;
     }
 
-    /// <summary>What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_support` names the groups.</summary>
+    /// <summary>What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_read_support` names the groups.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_support
     {
@@ -726,10 +745,14 @@ namespace Upt.Interop
         public const int UPT_STEP_WHOLE = 2;
         /// <summary>The faster of split and whole, timed while the scene is created.</summary>
         public const int UPT_STEP_MEASURED = 3;
-        /// <summary>No corrections.</summary>
-        public const int UPT_CORRECTIONS_NONE = -1;
-        /// <summary>As many corrections as the scene's target needs and its budget allows.</summary>
-        public const int UPT_CORRECTIONS_AUTO = -2;
+        /// <summary>As many as the bundle recommends, until its own target is reached.</summary>
+        public const int UPT_CORRECTIONS_RECOMMENDED = 0;
+        /// <summary>None.</summary>
+        public const int UPT_CORRECTIONS_NONE = 1;
+        /// <summary>`count` of them; with a target or a budget at most so many.</summary>
+        public const int UPT_CORRECTIONS_COUNT = 2;
+        /// <summary>As many as the target needs and the budget allows, up to 64.</summary>
+        public const int UPT_CORRECTIONS_AUTO = 3;
         /// <summary>A switch: as usual, which its field says.</summary>
         public const int UPT_SWITCH_DEFAULT = 0;
         /// <summary>A switch: on.</summary>
@@ -918,7 +941,7 @@ namespace Upt.Interop
         /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_open(byte* path, upt_model_options* options, IntPtr* @out);
+        public static extern int upt_model_create(byte* path, upt_model_options* options, IntPtr* @out);
 
         /// <summary>
         /// Closes a model. Its scenes keep what they need and stay usable.
@@ -927,7 +950,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was closed before).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_close(IntPtr model);
+        public static extern int upt_model_destroy(IntPtr model);
 
         /// <summary>
         /// Describes a model in numbers. Set `out-&gt;struct_size` first.
@@ -936,7 +959,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_get_info(IntPtr model, upt_model_info* @out);
+        public static extern int upt_model_read_info(IntPtr model, upt_model_info* @out);
 
         /// <summary>
         /// Describes a model as JSON: name, bundle hash, the provider of each stage and why the others were not chosen.
@@ -960,7 +983,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_positions(IntPtr model, float* @out, ulong count);
+        public static extern int upt_model_read_positions(IntPtr model, float* @out, ulong count);
 
         /// <summary>
         /// Copies a static index set.
@@ -974,7 +997,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_indices(IntPtr model, int set, uint* @out, ulong capacity, ulong* needed);
+        public static extern int upt_model_read_indices(IntPtr model, int set, uint* @out, ulong capacity, ulong* needed);
 
         /// <summary>
         /// Names a support group of a bundle, and copies its nodes: what `upt_input.supports` moves.
@@ -989,7 +1012,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such group, a capacity too small).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_support(IntPtr model, uint group, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
+        public static extern int upt_model_read_support(IntPtr model, uint group, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
 
         /// <summary>
         /// Names a region of the surface that the bundle names, and copies its nodes: what `upt_pressure.nodes` takes.
@@ -1004,7 +1027,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such region, a capacity too small).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_region(IntPtr model, uint region, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
+        public static extern int upt_model_read_region(IntPtr model, uint region, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
 
         /// <summary>
         /// Creates a scene at rest.
@@ -1021,7 +1044,7 @@ namespace Upt.Interop
 
         /// <summary>
         /// Destroys a scene, after waiting for a step in flight. A poisoned scene accepts only this call and
-        /// `upt_scene_get_stats`.
+        /// `upt_scene_read_stats`.
         ///
         /// Threads: any.
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before), `UPT_ERR_BUSY` while another thread is in
@@ -1045,11 +1068,11 @@ namespace Upt.Interop
         /// Instruments are where they will be at the end of the step: each moves there on a straight line from its last pose, and their contact is
         /// solved. An instrument that would move more than 40 mm in a step is placed there without a motion. Contact is unilateral, with
         /// Coulomb friction, at points of the domain's surface at most 1.7 mm apart. A scene with corrections solves it inside each
-        /// correction, as a load; with `corrections = UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene remembers
+        /// correction, as a load; with `UPT_CORRECTIONS_NONE` it is solved once, on the linear response. The scene remembers
         /// each place of the array: pass every instrument every time, in the same order.
         ///
         /// - `input`: what drives the step; NULL: nothing does, the tissue moves on by itself.
-        /// - `out`: `[n,3]`, mm (n: K, or the region's count; K of a cut body counts the copies of its nodes, `upt_scene_node_count`), may be NULL;
+        /// - `out`: `[n,3]`, mm (n: K, or the region's count; K of a cut body counts the copies of its nodes, `upt_scene_read_node_count`), may be NULL;
         /// it may be the memory of an input, at the cost of a copy.
         /// - `out_count`: number of floats in `out`, 3 n; 0 when out is NULL.
         ///
@@ -1219,7 +1242,7 @@ namespace Upt.Interop
         /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of instruments.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_instrument_readings(IntPtr scene, upt_instrument_reading* @out, ulong count);
+        public static extern int upt_scene_read_instruments(IntPtr scene, upt_instrument_reading* @out, ulong count);
 
         /// <summary>
         /// Copies the points of the surface that pushed or held instruments at the end of the last step, ascending by instrument.
@@ -1232,7 +1255,7 @@ namespace Upt.Interop
         /// `UPT_ERR_ARGUMENT` if capacity is too small.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_instrument_contacts(IntPtr scene, upt_instrument_contact* @out, ulong capacity, ulong* needed);
+        public static extern int upt_scene_read_instrument_contacts(IntPtr scene, upt_instrument_contact* @out, ulong capacity, ulong* needed);
 
         /// <summary>
         /// Creates the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
@@ -1268,7 +1291,7 @@ namespace Upt.Interop
         /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of ties.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_tie_readings(IntPtr scene, upt_tie_reading* @out, ulong count);
+        public static extern int upt_scene_read_ties(IntPtr scene, upt_tie_reading* @out, ulong count);
 
         /// <summary>
         /// Finds the points of the tissue nearest to places, for ties: of the domain, the surface that instruments may touch, where it is in the last state.
@@ -1389,14 +1412,14 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` for a place that is not aligned, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_node_count(IntPtr scene, ulong* @out);
+        public static extern int upt_scene_read_node_count(IntPtr scene, ulong* @out);
 
         /// <summary>
         /// Brings the closed surface of the body up to date: the mesh's own where nothing has happened, the lips of cuts, and what removal has laid
         /// bare. Tells what has changed since the last call. Where the body has not changed since, it does nothing, so it may be called in every frame.
         ///
         /// Vertices and slots of triangles keep their numbers, so that a renderer uploads the vertices from `first_vertex` on and the slots that
-        /// `upt_scene_surface` lists, unless `is_new` is 1. The first vertices are the nodes of the mesh, also those inside, which no triangle has;
+        /// `upt_scene_read_surface` lists, unless `is_new` is 1. The first vertices are the nodes of the mesh, also those inside, which no triangle has;
         /// vertices that nothing uses any more stay. Works on an intact body, too.
         ///
         /// - `out`: counts; set `struct_size`.
@@ -1421,7 +1444,7 @@ namespace Upt.Interop
         /// `UPT_ERR_NULL` for the scene, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_surface(IntPtr scene, float* rest, ulong vertex_count, uint* triangles, byte* inside, ulong triangle_count, uint* changed, ulong changed_count);
+        public static extern int upt_scene_read_surface(IntPtr scene, float* rest, ulong vertex_count, uint* triangles, byte* inside, ulong triangle_count, uint* changed, ulong changed_count);
 
         /// <summary>
         /// Copies where the vertices of the surface are in the last published state.
@@ -1434,7 +1457,7 @@ namespace Upt.Interop
         /// with a region, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_surface_positions(IntPtr scene, float* @out, ulong out_count);
+        public static extern int upt_scene_read_surface_positions(IntPtr scene, float* @out, ulong out_count);
 
         /// <summary>
         /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
@@ -1450,7 +1473,7 @@ namespace Upt.Interop
         /// those of the step. Neither `displacement` nor `time_s` may be set. NULL: nothing touches the tissue.
         /// - `when`: the moment on the clock of the steps' `time_s`, s, not before that of the last published step; for hosts whose steps have
         /// no time, the time since the last published step. Velocities are followed for two steps at most.
-        /// - `view`: the region, the attached points, or the vertices of the surface, `rest + out` of `upt_scene_surface`; NULL: the region.
+        /// - `view`: the region, the attached points, or the vertices of the surface, `rest + out` of `upt_scene_read_surface`; NULL: the region.
         /// - `out`: `[n,3]`, mm, in the view's order.
         /// - `out_count`: number of floats in `out`, 3 n.
         ///
@@ -1546,17 +1569,26 @@ namespace Upt.Interop
         /// `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; `UPT_ERR_UNSUPPORTED` also for a cut body.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_contact_force(IntPtr scene, float* @out, ulong out_count);
+        public static extern int upt_scene_read_contact_force(IntPtr scene, float* @out, ulong out_count);
 
         /// <summary>
-        /// Reports what the last step did and how long it took. Set `out-&gt;struct_size` first. Works while a step is in flight and
+        /// Reports what the last step did. Set `out-&gt;struct_size` first. Works while a step is in flight and
         /// on a poisoned scene.
         ///
         /// Threads: any.
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_get_stats(IntPtr scene, upt_scene_stats* @out);
+        public static extern int upt_scene_read_stats(IntPtr scene, upt_scene_stats* @out);
+
+        /// <summary>
+        /// Reports how long the last step and its stages took. Set `out-&gt;struct_size` first. Works as `upt_scene_read_stats` does.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern int upt_scene_read_timing(IntPtr scene, upt_scene_timing* @out);
 
         /// <summary>
         /// Saves the state, so that it can be restored exactly.

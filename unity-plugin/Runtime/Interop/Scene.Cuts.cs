@@ -127,7 +127,7 @@ namespace Upt.Interop
                 fixed (byte* i = surface.Inside)
                 fixed (uint* c = surface.Changed)
                 {
-                    Status.Check(Native.upt_scene_surface(scene, r, now.vertex_count, t, i, now.triangle_count, c,
+                    Status.Check(Native.upt_scene_read_surface(scene, r, now.vertex_count, t, i, now.triangle_count, c,
                                                           now.changed_count));
                 }
             }
@@ -145,7 +145,7 @@ namespace Upt.Interop
             try
             {
                 fixed (float* o = output)
-                    Status.Check(Native.upt_scene_surface_positions(scene, o, Length(output)));
+                    Status.Check(Native.upt_scene_read_surface_positions(scene, o, Length(output)));
             }
             finally { Leave(); }
         }
@@ -162,7 +162,7 @@ namespace Upt.Interop
         {
             ulong count = 0;
             IntPtr scene = Enter();
-            try { Status.Check(Native.upt_scene_node_count(scene, &count)); }
+            try { Status.Check(Native.upt_scene_read_node_count(scene, &count)); }
             finally { Leave(); }
             int nodes = checked((int)count);
             if (nodes == NodeCount) return;

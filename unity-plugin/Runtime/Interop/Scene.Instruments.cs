@@ -15,7 +15,7 @@ namespace Upt.Interop
             try
             {
                 fixed (upt_instrument_reading* o = output)
-                    Status.Check(Native.upt_scene_instrument_readings(scene, o, (ulong)count));
+                    Status.Check(Native.upt_scene_read_instruments(scene, o, (ulong)count));
             }
             finally { Leave(); }
         }
@@ -28,11 +28,11 @@ namespace Upt.Interop
             try
             {
                 ulong needed = 0;
-                Status.Check(Native.upt_scene_instrument_contacts(scene, null, 0, &needed));
+                Status.Check(Native.upt_scene_read_instrument_contacts(scene, null, 0, &needed));
                 if (output == null || (ulong)output.Length < needed) output = new upt_instrument_contact[2 * needed];
                 if (needed == 0) return 0;
                 fixed (upt_instrument_contact* o = output)
-                    Status.Check(Native.upt_scene_instrument_contacts(scene, o, (ulong)output.Length, &needed));
+                    Status.Check(Native.upt_scene_read_instrument_contacts(scene, o, (ulong)output.Length, &needed));
                 return checked((int)needed);
             }
             finally { Leave(); }

@@ -13,7 +13,7 @@ namespace Upt.Interop
             try
             {
                 fixed (upt_tie_reading* o = output)
-                    Status.Check(Native.upt_scene_tie_readings(scene, o, checked((ulong)count)));
+                    Status.Check(Native.upt_scene_read_ties(scene, o, checked((ulong)count)));
             }
             finally { Leave(); }
             return output;

@@ -205,13 +205,24 @@ namespace Upt.Interop
             finally { Leave(); }
         }
 
-        /// <summary>Times per stage, flags, sleep state of the last step.</summary>
+        /// <summary>What the last step and its stages took, ms.</summary>
+        public upt_scene_timing Timing()
+        {
+            upt_scene_timing timing = default(upt_scene_timing);
+            timing.struct_size = (uint)sizeof(upt_scene_timing);
+            IntPtr scene = Enter();
+            try { Status.Check(Native.upt_scene_read_timing(scene, &timing)); }
+            finally { Leave(); }
+            return timing;
+        }
+
+        /// <summary>Flags and sleep state of the last step.</summary>
         public upt_scene_stats Stats()
         {
             upt_scene_stats stats = default(upt_scene_stats);
             stats.struct_size = (uint)sizeof(upt_scene_stats);
             IntPtr scene = Enter();
-            try { Status.Check(Native.upt_scene_get_stats(scene, &stats)); }
+            try { Status.Check(Native.upt_scene_read_stats(scene, &stats)); }
             finally { Leave(); }
             return stats;
         }

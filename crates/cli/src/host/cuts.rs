@@ -75,7 +75,7 @@ impl Scene {
         Ok(out)
     }
 
-    /// `upt_scene_update_surface` and `upt_scene_surface`.
+    /// `upt_scene_update_surface` and `upt_scene_read_surface`.
     pub fn update_surface(&mut self) -> Result<SurfaceNews> {
         // SAFETY: the struct states its size, and each array has room for as many elements as its count says.
         unsafe {
@@ -90,7 +90,7 @@ impl Scene {
                 inside: vec![0; slots],
                 changed: vec![0; update.changed_count as usize],
             };
-            check(ffi::upt_scene_surface(
+            check(ffi::upt_scene_read_surface(
                 self.handle,
                 news.rest.as_mut_ptr().cast(),
                 update.vertex_count,

@@ -21,14 +21,17 @@ impl Scene {
             options.kernel = kernel;
             options.precision = model.info.precision;
             options.guard_policy = ffi::UPT_GUARD_REPORT;
-            options.corrections = match model.corrections {
-                None => 0,
-                Some(Effort { most: 0, .. }) => ffi::UPT_CORRECTIONS_NONE,
-                Some(effort) => effort.most as i32,
+            let (mode, count) = match model.corrections {
+                None => (ffi::UPT_CORRECTIONS_RECOMMENDED, 0),
+                Some(Effort { most: 0, .. }) => (ffi::UPT_CORRECTIONS_NONE, 0),
+                Some(effort) => (ffi::UPT_CORRECTIONS_COUNT, effort.most),
             };
-            options.corrections_budget_us = model.correction_budget_us;
-            options.corrections_target_mm =
-                model.corrections.map_or(0.0, |effort| effort.target_mm);
+            options.corrections = ffi::upt_corrections {
+                mode,
+                count,
+                budget_us: model.correction_budget_us,
+                target_mm: model.corrections.map_or(0.0, |effort| effort.target_mm),
+            };
             options.substeps = model.corrections.map_or(0, |effort| effort.substeps) as u8;
             options.step_s = model.step_s;
             options.damping_per_s = model.damping_per_s;
@@ -165,7 +168,7 @@ impl Scene {
         Ok(status != ffi::UPT_PENDING)
     }
 
-    /// `upt_scene_instrument_readings` of the last step's `count` instruments.
+    /// `upt_scene_read_instruments` of the last step's `count` instruments.
     pub fn readings(&self, count: usize) -> Result<Vec<ffi::upt_instrument_reading>> {
         // SAFETY: zeros are valid numbers.
         let mut blank: ffi::upt_instrument_reading = unsafe { std::mem::zeroed() };
@@ -173,7 +176,7 @@ impl Scene {
         let mut readings = vec![blank; count];
         // SAFETY: the pointer and count describe the list.
         check(unsafe {
-            ffi::upt_scene_instrument_readings(self.handle, readings.as_mut_ptr(), count as u64)
+            ffi::upt_scene_read_instruments(self.handle, readings.as_mut_ptr(), count as u64)
         })?;
         Ok(readings)
     }
@@ -213,14 +216,19 @@ impl Scene {
         }
     }
 
-    /// `upt_scene_instrument_contacts` of the last step.
+    /// `upt_scene_read_instrument_contacts` of the last step.
     pub fn instrument_contacts(&self) -> Result<Vec<ffi::upt_instrument_contact>> {
         let mut needed = 0;
         // SAFETY: a NULL buffer of capacity 0 asks for the count; the second call has that capacity.
         unsafe {
-            ffi::upt_scene_instrument_contacts(self.handle, std::ptr::null_mut(), 0, &mut needed);
+            ffi::upt_scene_read_instrument_contacts(
+                self.handle,
+                std::ptr::null_mut(),
+                0,
+                &mut needed,
+            );
             let mut out = vec![zeroed(); needed as usize];
-            check(ffi::upt_scene_instrument_contacts(
+            check(ffi::upt_scene_read_instrument_contacts(
                 self.handle,
                 out.as_mut_ptr(),
                 needed,
@@ -230,12 +238,16 @@ impl Scene {
         }
     }
 
-    /// `upt_scene_contact_force` at the `count` contact nodes of the last step, mN.
+    /// `upt_scene_read_contact_force` at the `count` contact nodes of the last step, mN.
     pub fn contact_force(&mut self, count: usize) -> Result<Vec<[f32; 3]>> {
         let mut out = vec![[0.0; 3]; count];
         // SAFETY: pointer and count describe `out`.
         check(unsafe {
-            ffi::upt_scene_contact_force(self.handle, out.as_mut_ptr().cast(), 3 * count as u64)
+            ffi::upt_scene_read_contact_force(
+                self.handle,
+                out.as_mut_ptr().cast(),
+                3 * count as u64,
+            )
         })?;
         Ok(out)
     }
@@ -279,13 +291,24 @@ impl Scene {
         Hand::create(self.handle, tool, latency_ms)
     }
 
-    /// `upt_scene_get_stats`.
+    /// `upt_scene_read_timing`.
+    pub fn timing(&self) -> Result<ffi::upt_scene_timing> {
+        // SAFETY: the struct is a place to write to and states its size.
+        unsafe {
+            let mut timing: ffi::upt_scene_timing = zeroed();
+            timing.struct_size = size::<ffi::upt_scene_timing>();
+            check(ffi::upt_scene_read_timing(self.handle, &mut timing))?;
+            Ok(timing)
+        }
+    }
+
+    /// `upt_scene_read_stats`.
     pub fn stats(&self) -> Result<ffi::upt_scene_stats> {
         // SAFETY: the struct is a place to write to and states its size.
         unsafe {
             let mut stats: ffi::upt_scene_stats = zeroed();
             stats.struct_size = size::<ffi::upt_scene_stats>();
-            check(ffi::upt_scene_get_stats(self.handle, &mut stats))?;
+            check(ffi::upt_scene_read_stats(self.handle, &mut stats))?;
             Ok(stats)
         }
     }

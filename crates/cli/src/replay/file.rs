@@ -32,9 +32,28 @@ pub struct Header {
 pub struct SceneFields {
     pub step_s: f64,
     pub damping_per_s: f64,
-    pub corrections: i32,
-    pub corrections_target_mm: f32,
+    pub corrections: CorrectionFields,
     pub substeps: u32,
+}
+
+/// `upt_corrections` without its budget, which counts by the clock.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CorrectionFields {
+    pub mode: CorrectionsMode,
+    pub count: u32,
+    pub target_mm: f32,
+}
+
+/// `UPT_CORRECTIONS_*`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CorrectionsMode {
+    #[default]
+    Recommended,
+    None,
+    Count,
+    Auto,
 }
 
 /// A further line.

@@ -17,7 +17,7 @@ use upt::contact::{Mode, Tool};
 use upt::{Contact, Corrections, Loads, Model, ModelOptions, Scene, SceneOptions, StepInput};
 
 use crate::manifest::hex;
-use file::{Header, Instrument, Kind, Line, SceneFields, Step};
+use file::{CorrectionFields, CorrectionsMode, Header, Instrument, Kind, Line, SceneFields, Step};
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -171,21 +171,29 @@ fn tool(given: &Instrument) -> Result<Tool> {
 }
 
 fn scene_options(fields: &SceneFields) -> Result<SceneOptions> {
-    let target_mm = fields.corrections_target_mm;
+    let CorrectionFields {
+        mode,
+        count,
+        target_mm,
+    } = fields.corrections;
+    ensure!(
+        count == 0 || mode == CorrectionsMode::Count,
+        "line 1: scene.corrections has the count {count} and not the mode `count`"
+    );
     let auto = |most| Corrections::Auto {
         most,
         target_mm,
         budget_us: 0,
     };
     Ok(SceneOptions {
-        corrections: match (fields.corrections, target_mm > 0.0) {
-            (upt::ffi::UPT_CORRECTIONS_AUTO, _) => auto(64),
-            (upt::ffi::UPT_CORRECTIONS_NONE, false) => Corrections::None,
-            (0, false) => Corrections::Recommended,
-            (count @ 1.., true) => auto(count as u32),
-            (count @ 1.., false) => Corrections::Fixed(count as u32),
-            (count, _) => anyhow::bail!(
-                "line 1: scene.corrections is {count} with a target of {target_mm} mm; no scene has that"
+        corrections: match (mode, target_mm > 0.0) {
+            (CorrectionsMode::Auto, _) => auto(64),
+            (CorrectionsMode::Count, true) => auto(count),
+            (CorrectionsMode::Count, false) => Corrections::Fixed(count),
+            (CorrectionsMode::None, false) => Corrections::None,
+            (CorrectionsMode::Recommended, false) => Corrections::Recommended,
+            (CorrectionsMode::None | CorrectionsMode::Recommended, true) => anyhow::bail!(
+                "line 1: scene.corrections has a target of {target_mm} mm, which is for the modes `count` and `auto`"
             ),
         },
         step_s: fields.step_s,

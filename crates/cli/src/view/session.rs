@@ -357,7 +357,7 @@ impl Session {
             stats.flags.to_le_bytes(),
             self.contacts.to_le_bytes(),
             state.to_le_bytes(),
-            (stats.step_ms as f32).to_le_bytes(),
+            (self.scene.timing()?.step_ms as f32).to_le_bytes(),
             stats.indicator.to_le_bytes(),
             force[0].to_le_bytes(),
             force[1].to_le_bytes(),

@@ -188,7 +188,7 @@ impl Stepper {
         let Self::Surrogate(surrogate) = self else {
             return Ok(Vec::new());
         };
-        let stats = surrogate.stats()?;
+        let stats = surrogate.timing()?;
         let named = [
             ("check", stats.check_ms),
             ("prior", stats.prior_ms),

@@ -30,7 +30,7 @@ impl Driver {
         };
         let mut step = Step {
             ms,
-            contact_ms: found_ms + stats.prior_ms,
+            contact_ms: found_ms + self.scene.timing()?.prior_ms,
             flags: stats.flags,
             felt: vec![Felt::default(); poses.len()],
             loads: Vec::new(),

@@ -36,7 +36,7 @@ impl Driver {
         });
         Ok(Step {
             ms,
-            contact_ms: stats.contact_ms,
+            contact_ms: self.scene.timing()?.contact_ms,
             flags: stats.flags,
             felt: felt.collect(),
             loads: loads.collect(),
