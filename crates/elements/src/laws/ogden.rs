@@ -142,7 +142,7 @@ impl Ogden {
         let bad = steps.into_iter().find(|s| self.rise(*s) <= 0.0)?;
         let wanted = format!(
             "of the sign of its alpha, or smaller: the law is not elliptic, stress falls with stretch at a stretch of {:.2}",
-            bad.exp()
+            libm::exp(bad)
         );
         MaterialError::some(field, value, wanted)
     }
