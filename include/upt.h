@@ -946,8 +946,7 @@ typedef struct upt_support {
 } upt_support;
 
 /**
- * The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
- * by itself.
+ * The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: the tissue moves on by itself.
  *
  * One thing drives a step: `instruments`, the nodes in contact, or `collision`; two at once are `UPT_ERR_ARGUMENT`. Later versions add
  * fields at the end.
@@ -2047,18 +2046,24 @@ upt_status upt_scene_read_instrument_contacts(struct upt_scene *scene,
                                               uint64_t *needed);
 
 /**
- * Creates the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
+ * Creates the shape of a tool of your own, for `UPT_SHAPE_HULL`: a closed surface of triangles with all its hollows, or the convex hull of points.
  *
  * - `points`: `[n,3]`, mm, in the tool's own frame.
  * - `point_count`: n, 4 to 100,000.
+ * - `faces`: `[m,3]`, points of each triangle, all clockwise or all anticlockwise; each edge belongs to two. NULL with `face_count` 0: the convex
+ *   hull of the points.
+ * - `face_count`: m, at most 200,000.
  * - `out`: the new hull.
  *
  * Threads: any.
- * Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume,
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume, and for a surface that is not closed
+ * or has a wall of less than 0.2 mm,
  * `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_OUT_OF_MEMORY`.
  */
 upt_status upt_hull_create(const float *points,
                            uint64_t point_count,
+                           const uint32_t *faces,
+                           uint64_t face_count,
                            struct upt_hull **out);
 
 /**

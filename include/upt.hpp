@@ -348,7 +348,7 @@ private:
   upt_model *handle_ = nullptr;
 };
 
-/// The convex hull of a tool's points, for instruments of shape UPT_SHAPE_HULL. Immutable: any
+/// A tool of its own shape, for instruments of shape UPT_SHAPE_HULL. Immutable: any
 /// thread may use it. It must live while you pass instruments that name it to a scene.
 class Hull {
 public:
@@ -365,13 +365,15 @@ public:
   Hull &operator=(const Hull &) = delete;
   ~Hull() { destroy(); }
 
-  /// points: [n,3], mm, in the tool's own frame. Destroys a hull that this object already held.
-  upt_status create(span<const float> points) {
-    if (points.size() % 3 != 0) {
+  /// points: [n,3], mm, in the tool's own frame; faces: [m,3] of a closed surface, whose hollows
+  /// stay, or none for the convex hull. Destroys a hull that this object already held.
+  upt_status create(span<const float> points, span<const std::uint32_t> faces = {}) {
+    if (points.size() % 3 != 0 || faces.size() % 3 != 0) {
       return detail::mismatch();
     }
     upt_hull *handle = nullptr;
-    const upt_status status = check(upt_hull_create(points.data(), points.size() / 3, &handle));
+    const upt_status status = check(upt_hull_create(points.data(), points.size() / 3,
+                                                    faces.data(), faces.size() / 3, &handle));
     if (status == UPT_OK) {
       destroy();
       handle_ = handle;
@@ -380,7 +382,9 @@ public:
   }
 
 #ifndef UPT_NO_EXCEPTIONS
-  explicit Hull(span<const float> points) { create(points); }
+  explicit Hull(span<const float> points, span<const std::uint32_t> faces = {}) {
+    create(points, faces);
+  }
 #endif
 
   /// Steps that were submitted with it still finish.

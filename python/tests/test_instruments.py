@@ -71,6 +71,40 @@ def test_a_press_is_read_and_a_lift_ends_it(corrected):
         assert scene.readings() == []
 
 
+def staple() -> tuple[np.ndarray, np.ndarray]:
+    """Points and faces of two legs of 4 mm, 12 mm apart, which hang from a bridge; they end at z = 0."""
+    outline = [(-10, 0), (-6, 0), (-6, 6), (6, 6), (6, 0), (10, 0), (10, 10), (-10, 10)]
+    cap = np.array([(0, 1, 2), (0, 2, 7), (2, 3, 6), (2, 6, 7), (3, 4, 5), (3, 5, 6)])
+    points = np.array([(x, y, z) for y in (-4, 4) for x, z in outline], np.float32)
+    around = [(k, (k + 1) % 8) for k in range(8)]
+    sides = [side for a, b in around for side in ((a, a + 8, b), (b, a + 8, b + 8))]
+    return points, np.concatenate([cap, cap[:, ::-1] + 8, np.array(sides)])
+
+
+def test_a_tool_with_a_hollow_touches_beside_it_only(corrected):
+    place, normal = site(corrected)
+    assert normal[2] > 0.99
+    points, faces = staple()
+    between = []
+    for shape in (upt.Hull(points, faces), upt.Hull(points)):
+        with corrected.scene(corrections=5) as scene:
+            tool = upt.Instrument.hull(shape)
+            for depth in (0.3, 0.6, 0.9):
+                tool.position = place - depth * normal
+                scene.step([tool])
+            assert scene.readings()[0].force[2] > 0
+            across = np.array([contact.position[0] for contact in scene.instrument_contacts()]) - place[0]
+            between.append(int((np.abs(across) < 5).sum()))
+            assert (across < -5.5).any() and (across > 5.5).any()
+    assert between[0] == 0 and between[1] > 0, between
+    with pytest.raises(upt.ArgumentError, match="not closed"):
+        upt.Hull(points, faces[:-1])
+    with pytest.raises(upt.ArgumentError, match="thick at"):
+        upt.Hull(points * (1, 0.02, 1), faces)
+    with pytest.raises(ValueError, match="triangles"):
+        upt.Hull(points, [0, 1])
+
+
 @pytest.mark.parametrize("shape", ["capsule", "box", "spatula", "hull"])
 def test_each_shape_pushes_the_same_when_submitted(corrected, shape):
     half, place = (3, 3, 3), pressing(corrected, 0.5)

@@ -1,4 +1,4 @@
-"""Rigid instruments that drive a scene's steps, and the hull of your own tool."""
+"""Rigid instruments that drive a scene's steps, and tools of a shape of their own."""
 
 from __future__ import annotations
 
@@ -9,29 +9,36 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from reprlib import repr as short
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from upt import _native
-from upt._arrays import address, vectors
+from upt._arrays import address, indices, vectors
 from upt._library import check, ensure_started, lib
 from upt._native import Mode, Shape
 
 
 class Hull:
-    """The convex hull of a tool's points, for `Instrument.hull`. Immutable; any thread may use it.
+    """A tool of its own shape, for `Instrument.hull`. Immutable; any thread may use it.
 
     Args:
         points: `[n, 3]`, mm, in the tool's own frame; 4 to 100,000, with a volume.
+        faces: `[m, 3]`, points of each triangle of a closed surface, whose hollows stay; none for the convex hull.
 
     Raises:
-        upt.ArgumentError: points that are not finite, too few, too many or without a volume.
+        upt.ArgumentError: points that are not finite, too few, too many or without a volume; a surface that is not
+            closed or has a wall of less than 0.2 mm.
     """
 
-    def __init__(self, points: ArrayLike) -> None:
+    def __init__(self, points: ArrayLike, faces: ArrayLike | None = None) -> None:
         ensure_started()
         given = vectors(points, "points")
+        sides = indices(() if faces is None else np.asarray(faces).reshape(-1), "faces")
+        if len(sides) % 3 != 0:
+            raise ValueError(f"faces: {len(sides)} points make no triangles; give [m, 3]")
         handle = ctypes.c_void_p()
-        check(lib.upt_hull_create(address(given), len(given), ctypes.byref(handle)))
+        count = len(sides) // 3
+        check(lib.upt_hull_create(address(given), len(given), address(sides), count, ctypes.byref(handle)))
         self._handle = handle.value
         self._destroy = weakref.finalize(self, lib.upt_hull_destroy, handle.value)
 
@@ -137,7 +144,7 @@ class Instrument:
         grasp: bool = False,
         tear_off: float = 0.0,
     ) -> Instrument:
-        """The convex hull of points `[n, 3]`, mm, in the tool's own frame, or a `Hull` that several share."""
+        """The convex hull of points `[n, 3]`, mm, in the tool's own frame, or a `Hull`, which may have hollows."""
         made = hull if isinstance(hull, Hull) else Hull(hull)
         return cls(
             Shape.HULL,

@@ -91,19 +91,25 @@ pub unsafe extern "C" fn upt_scene_read_instrument_contacts(
     })
 }
 
-/// Creates the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
+/// Creates the shape of a tool of your own, for `UPT_SHAPE_HULL`: a closed surface of triangles with all its hollows, or the convex hull of points.
 ///
 /// - `points`: `[n,3]`, mm, in the tool's own frame.
 /// - `point_count`: n, 4 to 100,000.
+/// - `faces`: `[m,3]`, points of each triangle, all clockwise or all anticlockwise; each edge belongs to two. NULL with `face_count` 0: the convex
+///   hull of the points.
+/// - `face_count`: m, at most 200,000.
 /// - `out`: the new hull.
 ///
 /// Threads: any.
-/// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume,
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume, and for a surface that is not closed
+/// or has a wall of less than 0.2 mm,
 /// `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_hull_create(
     points: *const f32,
     point_count: u64,
+    faces: *const u32,
+    face_count: u64,
     out: *mut *mut upt_hull,
 ) -> upt_status {
     call(
@@ -119,12 +125,30 @@ pub unsafe extern "C" fn upt_hull_create(
                 ))
                 .into());
             }
+            const MOST_FACES: u64 = 200_000;
+            if face_count > MOST_FACES {
+                return Err(Error::Argument(format!(
+                    "face_count is {face_count}, must be at most {MOST_FACES}; simplify the mesh"
+                ))
+                .into());
+            }
             // SAFETY: the host passes that many elements, as the header asks.
             let points = unsafe { slice(points, 3 * point_count, "points") }?;
+            // SAFETY: as above.
+            let faces = unsafe { slice(faces, 3 * face_count, "faces") }?;
             features::instruments()?;
-            crate::memory::probe(1024 * point_count as usize, "a hull")?;
-            let bad = |error: ::contact::ShapeError| Error::Argument(format!("points: {error}"));
-            let shape = Shape::hull_of(points.as_chunks().0).map_err(bad)?;
+            crate::memory::probe(1024 * (point_count + face_count) as usize, "a hull")?;
+            let what = if faces.is_empty() { "points" } else { "faces" };
+            let bad = |error: ::contact::ShapeError| Error::Argument(format!("{what}: {error}"));
+            let (points, faces) = (points.as_chunks().0, faces.as_chunks().0);
+            let shape = match faces {
+                [] => Shape::hull_of(points).map_err(bad)?,
+                faces => Shape::Mesh {
+                    points: points.to_vec(),
+                    faces: faces.to_vec(),
+                    margin: 0.0,
+                },
+            };
             let body = Body::new(&shape).map_err(bad)?;
             out.set(add_hull(body));
             Ok(UPT_OK)

@@ -92,7 +92,15 @@ impl World<'_> {
                         _ => &raw mut hull,
                     };
                     let from = pointer(points.as_flattened(), call, 0);
-                    let status = upt_hull_create(from, count, out);
+                    let sides = [0u32, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3];
+                    // Every other one by its faces; one of them beyond the points at times.
+                    let wrong = [0u32, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 77];
+                    let (faces, face_count) = match call.seed % 4 {
+                        0 => (sides.as_ptr(), 4),
+                        1 => (wrong.as_ptr(), 4),
+                        _ => (null(), 0),
+                    };
+                    let status = upt_hull_create(from, count, faces, face_count, out);
                     assert_eq!(status == UPT_OK, !hull.is_null());
                     if status == UPT_OK {
                         self.hulls.push(hull);

@@ -8,23 +8,31 @@
 static const float corners[24] = {-3, -3, -3, 3, -3, -3, -3, 3, -3, 3, 3, -3,
                                   -3, -3, 3,  3, -3, 3,  -3, 3, 3,  3, 3, 3};
 
+static const uint32_t faces[36] = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                   2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+
 static void walk_hull(upt_hull **hull) {
   float flat[12];
   upt_hull *other = NULL;
   memset(flat, 0, sizeof flat);
-  EXPECT(upt_hull_create(corners, 8, NULL), UPT_ERR_NULL);
+  EXPECT(upt_hull_create(corners, 8, NULL, 0, NULL), UPT_ERR_NULL);
   if (bare) {
-    EXPECT(upt_hull_create(corners, 8, hull), UPT_ERR_UNSUPPORTED);
+    EXPECT(upt_hull_create(corners, 8, NULL, 0, hull), UPT_ERR_UNSUPPORTED);
     EXPECT_TRUE(*hull == NULL);
     return;
   }
-  EXPECT(upt_hull_create(NULL, 8, hull), UPT_ERR_NULL);
-  EXPECT(upt_hull_create(corners, 3, hull), UPT_ERR_ARGUMENT);
-  EXPECT(upt_hull_create(corners, UINT64_MAX, hull), UPT_ERR_ARGUMENT);
-  EXPECT(upt_hull_create(flat, 4, hull), UPT_ERR_ARGUMENT);
+  EXPECT(upt_hull_create(NULL, 8, NULL, 0, hull), UPT_ERR_NULL);
+  EXPECT(upt_hull_create(corners, 3, NULL, 0, hull), UPT_ERR_ARGUMENT);
+  EXPECT(upt_hull_create(corners, UINT64_MAX, NULL, 0, hull), UPT_ERR_ARGUMENT);
+  EXPECT(upt_hull_create(flat, 4, NULL, 0, hull), UPT_ERR_ARGUMENT);
+  /* A surface is closed, and its faces name its points. */
+  EXPECT(upt_hull_create(corners, 8, NULL, 12, hull), UPT_ERR_NULL);
+  EXPECT(upt_hull_create(corners, 8, faces, 11, hull), UPT_ERR_ARGUMENT);
+  EXPECT(upt_hull_create(corners, 7, faces, 12, hull), UPT_ERR_ARGUMENT);
+  EXPECT(upt_hull_create(corners, 8, faces, UINT64_MAX, hull), UPT_ERR_ARGUMENT);
   EXPECT_TRUE(*hull == NULL);
-  EXPECT(upt_hull_create(corners, 8, hull), UPT_OK);
-  EXPECT(upt_hull_create(corners, 8, &other), UPT_OK);
+  EXPECT(upt_hull_create(corners, 8, NULL, 0, hull), UPT_OK);
+  EXPECT(upt_hull_create(corners, 8, faces, 12, &other), UPT_OK);
   EXPECT(upt_hull_destroy(other), UPT_OK);
   EXPECT(upt_hull_destroy(other), UPT_ERR_HANDLE);
   EXPECT(upt_hull_destroy(NULL), UPT_ERR_NULL);

@@ -58,7 +58,7 @@ fn what_a_step_takes_gives_contacts_too() {
         .collect();
     let mut hull = null_mut();
     assert_eq!(
-        unsafe { upt_hull_create(corners.as_ptr(), 8, &mut hull) },
+        unsafe { upt_hull_create(corners.as_ptr(), 8, null(), 0, &mut hull) },
         UPT_OK
     );
     (ball.shape, ball.radius, ball.hull) = (UPT_SHAPE_HULL, 0.0, hull.cast_const());

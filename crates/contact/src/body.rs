@@ -23,10 +23,6 @@ const BLUNT_MM: f32 = 0.65;
 const POINTED_MM: f32 = 0.2;
 /// Corners of a hull that serve as probes at most.
 const MOST_CORNERS: usize = 64;
-/// Ways along a line are followed at least by this, mm: what a line cuts off less deeply is missed.
-const GRAZING_MM: f32 = 0.02;
-/// Steps of a march along a line at most: one from a point that is not finite, or far beyond what f32 resolves, would not end.
-const MOST_MARCHES: u32 = 4096;
 
 #[derive(Clone, Debug)]
 enum Core {
@@ -47,6 +43,8 @@ pub struct Body {
     radius: f32,
     /// It has a corner that is less than [`BLUNT_MM`] thick a millimetre behind.
     pointed: bool,
+    /// Of a surface that may have hollows: half the thickness of its thinnest wall, and points inside of it.
+    walls: Option<(f32, Arc<[Vector]>)>,
     /// Middle and half sizes of the box around it, in its frame.
     middle: Vector,
     half: Vector,
@@ -132,16 +130,36 @@ impl Body {
             core,
             radius,
             pointed: false,
+            walls: None,
             middle: 0.5 * (low + high),
             half: 0.5 * (high - low) + Vector::splat(radius),
         };
-        if let (Core::Triangles(surface), Shape::Hull { .. }) = (body.core.clone(), shape) {
-            body.pointed = body.check_hull(&surface)? < BLUNT_MM;
-            if body.pointed {
-                body.round_off(&surface)?;
+        match (body.core.clone(), shape) {
+            (Core::Triangles(surface), Shape::Hull { .. }) => {
+                body.pointed = body.check_hull(&surface)? < BLUNT_MM;
+                if body.pointed {
+                    body.round_off(&surface)?;
+                }
             }
+            (Core::Triangles(surface), _) => body.walls = Some(body.check_walls(&surface)?),
+            _ => {}
         }
         Ok(body)
+    }
+
+    /// No wall of a surface is thinner than a blade may be. Returns half its thinnest, and middles of some walls.
+    fn check_walls(&self, surface: &Triangles) -> Result<(f32, Arc<[Vector]>), ShapeError> {
+        let walls: Vec<(Vector, f32)> = surface.walls().collect();
+        let thinnest = walls.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        let (at, length) = thinnest.copied().unwrap_or((Vector::ZERO, 0.0));
+        let thickness = length + 2.0 * self.radius;
+        if thickness < 0.4 * THINNEST_MM {
+            let at = at.to_array();
+            return Err(ShapeError::Wall { at, thickness });
+        }
+        let some = walls.len().div_ceil(MOST_CORNERS).max(1);
+        let inside = walls.iter().step_by(some).map(|wall| wall.0);
+        Ok((0.5 * thickness, inside.collect()))
     }
 
     /// Gives a hull with a point that of a rod: a ball of [`LEAST_RADIUS_MM`], which ends where the point does. Its sides stay where they are
@@ -222,7 +240,7 @@ impl Body {
             Core::Cuboid { .. } => true,
             Core::Triangles(_) => !self.pointed,
         };
-        is_flat && self.size() >= THIN_MM
+        is_flat && self.finest() >= THIN_MM
     }
 
     /// How round its edges are at least, mm; 0 where they are sharp.
@@ -230,9 +248,12 @@ impl Body {
         self.radius
     }
 
-    /// Half its smallest extent: the radius of a rod, half the thickness of a blade, mm.
+    /// Half its smallest extent: the radius of a rod, half the thickness of a blade or of the thinnest wall of a surface with hollows, mm.
     pub fn size(&self) -> f32 {
-        self.half.min_element()
+        match &self.walls {
+            Some((thin, _)) => *thin,
+            None => self.half.min_element(),
+        }
     }
 
     /// Signed distance and outward normal at a point of the tool's own frame.
@@ -268,72 +289,6 @@ impl Body {
         }
     }
 
-    /// Length of the way out of the tool from a point of the world along a unit direction, 0 outside; none where it is longer
-    /// than `limit`.
-    pub fn way_out(&self, pose: &Pose, from: Vector, direction: Vector, limit: f32) -> Option<f32> {
-        let mut length = 0.0;
-        // Inside, the surface is at least `-distance` away in any direction.
-        for _ in 0..MOST_MARCHES {
-            let distance = self.nearest_at(pose, from + direction * length).distance;
-            if distance >= -1e-3 {
-                return Some(length);
-            }
-            length -= distance;
-            if length > limit {
-                break;
-            }
-        }
-        None
-    }
-
-    /// The same from a point that may lie outside: length of the way along the direction until the tool is behind, none where that is longer than
-    /// `limit` or the line misses the tool.
-    pub fn way_through(
-        &self,
-        pose: &Pose,
-        from: Vector,
-        direction: Vector,
-        limit: f32,
-    ) -> Option<f32> {
-        let entry = self.first_inside(pose, from, direction, limit)?;
-        let out = self.way_out(pose, from + direction * entry, direction, limit - entry)?;
-        Some(entry + out)
-    }
-
-    /// Where a straight way from one point of the tool's own frame to another first lies inside of it, and the outward normal there.
-    pub fn entry(&self, from: Vector, to: Vector) -> Option<(Vector, Vector)> {
-        let way = to - from;
-        let length = way.length();
-        let direction = way.try_normalize()?;
-        let at = self.first_inside(&Pose::IDENTITY, from, direction, length)?;
-        // The march ends a little inside.
-        let nearest = self.nearest(from + direction * at);
-        let point = from + direction * (at + nearest.distance).max(0.0);
-        Some((point, nearest.normal))
-    }
-
-    /// Length along a line at which it first lies inside of the tool.
-    fn first_inside(
-        &self,
-        pose: &Pose,
-        from: Vector,
-        direction: Vector,
-        limit: f32,
-    ) -> Option<f32> {
-        let mut length = 0.0;
-        for _ in 0..MOST_MARCHES {
-            let distance = self.nearest_at(pose, from + direction * length).distance;
-            if distance < 0.0 {
-                return Some(length);
-            }
-            length += distance.max(GRAZING_MM);
-            if length > limit {
-                break;
-            }
-        }
-        None
-    }
-
     /// Corners of the axis-aligned box around the tool at `pose`, widened by `margin`.
     pub fn bounds(&self, pose: &Pose, margin: f32) -> (Vector, Vector) {
         let axes = [Vector::X, Vector::Y, Vector::Z].map(|axis| (pose.rotation * axis).abs());
@@ -351,22 +306,28 @@ impl Body {
     }
 
     /// Points inside the tool, in its frame, by which to see whether it lies in something: the middle, the middles of the faces of the box
-    /// around it, drawn in to the core, and corners of a hull.
+    /// around it, drawn in to the core, and corners of a hull; of a surface with hollows middles of its walls.
     pub fn probes(&self) -> impl Iterator<Item = Vector> {
         let core = self.half - Vector::splat(self.radius);
         let [x, y, z] = [Vector::X, Vector::Y, Vector::Z].map(|axis| axis * core);
+        let inside: &[Vector] = self.walls.as_ref().map_or(&[], |(_, inside)| inside);
         let corners: &[Vector] = match &self.core {
-            Core::Triangles(surface) => surface.corners(),
+            Core::Triangles(surface) if inside.is_empty() => surface.corners(),
             _ => &[],
         };
         let middle = self.middle;
         let corners = corners
             .iter()
             .step_by(corners.len().div_ceil(MOST_CORNERS).max(1));
-        [Vector::ZERO, x, -x, y, -y, z, -z]
-            .into_iter()
-            .chain(corners.map(move |corner| *corner - middle))
+        let offsets = [Vector::ZERO, x, -x, y, -y, z, -z];
+        // The middle of the box around a surface may lie in a hollow.
+        let convex = offsets.into_iter().take(match inside.is_empty() {
+            true => offsets.len(),
+            false => 0,
+        });
+        (convex.chain(corners.map(move |corner| *corner - middle)))
             .map(move |offset| middle + 0.999 * offset)
+            .chain(inside.iter().copied())
     }
 }
 

@@ -28,6 +28,10 @@ pub enum ShapeError {
     )]
     Thin { thickness: f32 },
     #[error(
+        "it is {thickness} mm thick at [{}, {}, {}] mm, and contact needs 0.2 mm; thicken or blunt it there, or take its hull", .at[0], .at[1], .at[2]
+    )]
+    Wall { at: [f32; 3], thickness: f32 },
+    #[error(
         "the hull is too pointed at [{}, {}, {}] mm: a millimetre behind that corner it is {thickness} mm thick, and contact needs 0.2 mm; blunt it", .corner[0], .corner[1], .corner[2]
     )]
     Pointed { corner: [f32; 3], thickness: f32 },

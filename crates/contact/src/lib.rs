@@ -2,7 +2,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`shape`], [`body`] | a tool's shape; signed distance and outward normal at a point |
+//! | [`shape`], [`body`] | a tool's shape; signed distance and outward normal at a point, ways along a line |
 //! | [`pose`] | where a tool is, checked, and the way between two poses |
 //! | [`samples`] | points of the tissue's surface at which contact is looked at: the rows of `B` |
 //! | [`search`] | which samples are near which tool |
@@ -32,6 +32,7 @@ pub mod shape;
 pub mod sweeps;
 pub mod tie;
 mod triangles;
+mod ways;
 
 pub use body::{Body, Nearest};
 pub use error::ShapeError;

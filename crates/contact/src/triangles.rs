@@ -2,7 +2,7 @@
 
 use crate::error::ShapeError;
 use parry3d::math::Vector;
-use parry3d::query::PointQueryWithLocation;
+use parry3d::query::{PointQueryWithLocation, Ray, RayCast};
 use parry3d::shape::{TriMesh, TriMeshFlags};
 use parry3d::transformation::try_convex_hull;
 use std::collections::HashMap;
@@ -93,6 +93,18 @@ impl Triangles {
         } else {
             (length, away / length)
         }
+    }
+
+    /// From the middle of each face straight through what it bounds: the middle of that way, and its length.
+    pub fn walls(&self) -> impl Iterator<Item = (Vector, f32)> {
+        (self.faces.triangles()).filter_map(|face| {
+            let inward = -face.normal()?;
+            let middle = (face.a + face.b + face.c) / 3.0;
+            // Not onto the face itself.
+            let ray = Ray::new(middle + CLOSE * inward, inward);
+            let length = CLOSE + self.faces.cast_local_ray(&ray, f32::MAX, false)?;
+            Some((middle + 0.5 * length * inward, length))
+        })
     }
 
     /// Its corners.

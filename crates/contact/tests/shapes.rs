@@ -153,6 +153,31 @@ fn a_surface_that_is_not_convex_keeps_its_hollow() {
     }
     // In the hollow, where its hull would be touched.
     assert!(body.nearest(Vector::new(5.0, 5.0, 0.0)).distance > 1.9);
+    // Its arms are 3 mm thick, and no probe lies in the hollow, as the middle of the box around it does.
+    assert!((body.size() - 1.5).abs() < 1e-3, "{}", body.size());
+    assert!(body.is_broad());
+    assert!(body.probes().count() > 10);
+    for probe in body.probes() {
+        assert!(body.nearest(probe).distance < -1e-3, "{probe}");
+    }
+    let Shape::Mesh { mut points, .. } = angle() else {
+        panic!("a mesh");
+    };
+    for p in &mut points {
+        p[2] *= 0.04;
+    }
+    let thin = Shape::Mesh {
+        points,
+        faces: match angle() {
+            Shape::Mesh { faces, .. } => faces,
+            _ => panic!("a mesh"),
+        },
+        margin: 0.0,
+    };
+    assert!(matches!(
+        Body::new(&thin).unwrap_err(),
+        ShapeError::Wall { .. }
+    ));
     let Shape::Mesh {
         points,
         mut faces,

@@ -322,8 +322,7 @@ namespace Upt.Interop
     }
 
     /// <summary>
-    /// The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: nothing happens, the tissue moves on
-    /// by itself.
+    /// The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: the tissue moves on by itself.
     ///
     /// One thing drives a step: `instruments`, the nodes in contact, or `collision`; two at once are `UPT_ERR_ARGUMENT`. Later versions add
     /// fields at the end.
@@ -1258,18 +1257,22 @@ namespace Upt.Interop
         public static extern int upt_scene_read_instrument_contacts(IntPtr scene, upt_instrument_contact* @out, ulong capacity, ulong* needed);
 
         /// <summary>
-        /// Creates the convex hull of a tool's points, for `UPT_SHAPE_HULL`.
+        /// Creates the shape of a tool of your own, for `UPT_SHAPE_HULL`: a closed surface of triangles with all its hollows, or the convex hull of points.
         ///
         /// - `points`: `[n,3]`, mm, in the tool's own frame.
         /// - `point_count`: n, 4 to 100,000.
+        /// - `faces`: `[m,3]`, points of each triangle, all clockwise or all anticlockwise; each edge belongs to two. NULL with `face_count` 0: the convex
+        /// hull of the points.
+        /// - `face_count`: m, at most 200,000.
         /// - `out`: the new hull.
         ///
         /// Threads: any.
-        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume,
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume, and for a surface that is not closed
+        /// or has a wall of less than 0.2 mm,
         /// `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_hull_create(float* points, ulong point_count, IntPtr* @out);
+        public static extern int upt_hull_create(float* points, ulong point_count, uint* faces, ulong face_count, IntPtr* @out);
 
         /// <summary>
         /// Destroys a hull. Steps that were submitted with it keep what they need.

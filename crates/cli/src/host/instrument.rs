@@ -13,18 +13,24 @@ pub fn instrument() -> ffi::upt_instrument {
     instrument
 }
 
-/// The convex hull of a tool's points; destroyed when dropped.
+/// A tool of its own shape; destroyed when dropped.
 pub struct Hull {
     handle: *mut ffi::upt_hull,
 }
 
 impl Hull {
-    /// `upt_hull_create`.
-    pub fn create(points: &[[f32; 3]]) -> Result<Self> {
+    /// `upt_hull_create`; without faces the convex hull of the points.
+    pub fn create(points: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<Self> {
         let mut handle = std::ptr::null_mut();
-        // SAFETY: pointer and count describe `points`; `handle` is a place to write to.
+        // SAFETY: pointers and counts describe `points` and `faces`; `handle` is a place to write to.
         check(unsafe {
-            ffi::upt_hull_create(points.as_ptr().cast(), points.len() as u64, &mut handle)
+            ffi::upt_hull_create(
+                points.as_ptr().cast(),
+                points.len() as u64,
+                faces.as_ptr().cast(),
+                faces.len() as u64,
+                &mut handle,
+            )
         })?;
         Ok(Self { handle })
     }

@@ -216,11 +216,19 @@ impl Driver {
 fn hull(drive: Drive, shape: &Shape) -> Result<Option<host::Hull>> {
     match (shape, drive) {
         (Shape::Hull { points, margin }, Drive::Solved) if *margin == 0.0 => {
-            Ok(Some(host::Hull::create(points)?))
+            Ok(Some(host::Hull::create(points, &[])?))
         }
+        (
+            Shape::Mesh {
+                points,
+                faces,
+                margin,
+            },
+            Drive::Solved,
+        ) if *margin == 0.0 => Ok(Some(host::Hull::create(points, faces)?)),
         (_, Drive::Linear) => Ok(None),
         (Shape::Hull { .. } | Shape::Mesh { .. }, _) => anyhow::bail!(
-            "the library cannot drive this shape ({}): it takes spheres, capsules, boxes, spatulas and, where contact is solved, hulls without a margin",
+            "the library cannot drive this shape ({}): it takes spheres, capsules, boxes, spatulas and, where contact is solved, hulls and meshes without a margin",
             drive.name()
         ),
         _ => Ok(None),
