@@ -24,8 +24,8 @@ pub fn documented() -> Documented {
     let text = std::fs::read_to_string("include/upt.h").unwrap();
     let codes: HashMap<&str, i32> = text
         .lines()
-        .filter_map(|line| line.strip_prefix("#define ")?.split_once(' '))
-        .filter_map(|(name, value)| Some((name, value.parse().ok()?)))
+        .filter_map(|line| line.trim().split_once(" = "))
+        .filter_map(|(name, value)| Some((name, value.trim_end_matches(',').parse().ok()?)))
         .collect();
     let mut own: HashMap<String, Vec<String>> = HashMap::new();
     for piece in text.split("/**").skip(1) {

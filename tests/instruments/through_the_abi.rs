@@ -4,7 +4,7 @@
     reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
 )]
 
-use std::ptr::null_mut;
+use std::ptr::{null, null_mut};
 
 use upt::ffi::*;
 
