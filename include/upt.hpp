@@ -372,8 +372,8 @@ public:
       return detail::mismatch();
     }
     upt_hull *handle = nullptr;
-    const upt_status status = check(upt_hull_create(points.data(), points.size() / 3,
-                                                    faces.data(), faces.size() / 3, &handle));
+    const upt_status status = check(
+        upt_hull_create(points.data(), points.size() / 3, faces.data(), faces.size() / 3, &handle));
     if (status == UPT_OK) {
       destroy();
       handle_ = handle;
@@ -633,9 +633,9 @@ public:
     out.changed.resize(static_cast<std::size_t>(now.changed_count));
     out.first_vertex = static_cast<std::size_t>(now.first_vertex);
     out.is_new = now.is_new != 0;
-    return check(upt_scene_read_surface(handle_, out.rest.data(), now.vertex_count, out.triangles.data(),
-                                   out.inside.data(), now.triangle_count, out.changed.data(),
-                                   now.changed_count));
+    return check(upt_scene_read_surface(handle_, out.rest.data(), now.vertex_count,
+                                        out.triangles.data(), out.inside.data(), now.triangle_count,
+                                        out.changed.data(), now.changed_count));
   }
   /// Where the vertices of the last surface are in the last state; out: [v,3], mm.
   upt_status surface_positions(span<float> out) {
