@@ -141,7 +141,7 @@ impl Scene {
         Ok(Some(ties))
     }
 
-    /// `upt_scene_tie_readings` of the last step's `count` ties.
+    /// `upt_scene_read_ties` of the last step's `count` ties.
     pub fn tie_readings(&self, count: usize) -> Result<Vec<ffi::upt_tie_reading>> {
         // SAFETY: zeros are valid numbers.
         let mut blank: ffi::upt_tie_reading = unsafe { zeroed() };
@@ -149,7 +149,7 @@ impl Scene {
         let mut readings = vec![blank; count];
         // SAFETY: the pointer and count describe the list.
         check(unsafe {
-            ffi::upt_scene_tie_readings(self.handle, readings.as_mut_ptr(), count as u64)
+            ffi::upt_scene_read_ties(self.handle, readings.as_mut_ptr(), count as u64)
         })?;
         Ok(readings)
     }
