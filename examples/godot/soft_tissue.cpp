@@ -121,7 +121,7 @@ static void press(void *instance, const GDExtensionConstTypePtr *arguments,
   put(result, opened(instance, [&](Tissue &tissue) {
         upt_instrument &tool = tissue.tool;
         tool = hold;
-        tool.shape = static_cast<int32_t>(*static_cast<const int64_t *>(arguments[0]));
+        tool.shape = static_cast<upt_shape>(*static_cast<const int64_t *>(arguments[0]));
         tool.position[0] = position[0] / METRES;
         tool.position[1] = -position[2] / METRES;
         tool.position[2] = position[1] / METRES;

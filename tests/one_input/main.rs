@@ -106,7 +106,7 @@ fn rust_frame(scene: &Scene, contact: Contact<'_>, when: f64) -> Vec<u32> {
 }
 
 fn awake(options: &mut upt_scene_options) {
-    options.sleep = UPT_SWITCH_OFF as u8;
+    options.sleep = UPT_SWITCH_OFF;
 }
 
 /// Each drive, by a step, a submitted step and a frame of the C ABI, against the Rust interface.

@@ -115,7 +115,7 @@ fn starve(bundle: &Path, options: upt_scene_options, calls: &[Call]) -> usize {
 fn options(change: impl FnOnce(&mut upt_scene_options)) -> upt_scene_options {
     let mut options = host::scene_options();
     options.guard_policy = UPT_GUARD_REPORT;
-    options.sleep = UPT_SWITCH_OFF as u8;
+    options.sleep = UPT_SWITCH_OFF;
     (options.check_inversion, options.cubic_sampling) = (1, 1);
     change(&mut options);
     options

@@ -129,7 +129,7 @@ impl Model {
             options.provider_count = 1;
             options.precision = settings.precision;
             if settings.exact {
-                options.fallback = ffi::UPT_SWITCH_OFF as u8;
+                options.fallback = ffi::UPT_SWITCH_OFF;
             }
             let mut handle = std::ptr::null_mut();
             check(ffi::upt_model_create(text.as_ptr(), &options, &mut handle))?;

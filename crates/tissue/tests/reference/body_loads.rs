@@ -5,6 +5,7 @@ use tissue::solver::{
     ContactNode, FrameReport, Loads, Solver, SolverError, SolverOptions, SupportMotion,
     SurfacePressure,
 };
+#[cfg(feature = "linear")]
 use tissue::statics;
 
 /// 1000 kg/m³ under 0.5 m/s², in N/m³.
@@ -118,6 +119,7 @@ fn a_body_under_pressure_has_the_closed_form() {
 }
 
 /// A body that was scanned under its weight: the solver takes the rest shape that is found for it back to the scan.
+#[cfg(feature = "linear")]
 #[test]
 fn a_rest_shape_hangs_as_it_was_scanned() {
     let scan = box_phantom([60.0, 60.0, 30.0], [5, 5, 3]).unwrap();
