@@ -48,8 +48,9 @@ int main(int argc, char **argv) {
   ok(upt_model_read_info(model, &info));
   memset(&options, 0, sizeof options);
   options.struct_size = sizeof options;
-  options.corrections.mode = UPT_CORRECTIONS_COUNT;
   options.corrections.count = (uint32_t)atoi(argv[3]);
+  options.corrections.mode =
+      options.corrections.count > 0 ? UPT_CORRECTIONS_COUNT : UPT_CORRECTIONS_RECOMMENDED;
   options.step_s = 0.02;
   ok(upt_scene_create(model, &options, &scene));
   rest = malloc(3 * info.node_count * sizeof *rest);

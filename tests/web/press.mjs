@@ -1,6 +1,6 @@
 // The steps of press.c in the module: the same poses, the same numbers.
 export function press(upt, model, { steps, corrections, each = () => {} }) {
-  const scene = model.scene({ stepSeconds: 0.02, corrections });
+  const scene = model.scene({ stepSeconds: 0.02, corrections: corrections || "recommended" });
   const [x, y, z] = model.positions().slice(3 * model.indices("domainNodes")[0]);
   const states = [];
   for (let step = 0; step < steps; step += 1) {

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
 /// Where an entry of a symmetric block is among its six.
-pub(super) const SYMMETRIC: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+const SYMMETRIC: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
 /// What is known of columns, with the factor that it was made by.
 #[derive(Default, HeldBytes)]
@@ -92,23 +92,6 @@ impl NearColumns {
         self.moved.clear();
         self.on_modes.clear();
         self.modes.clear();
-    }
-
-    /// Whether all columns of some loads are known by a factor.
-    pub fn knows(&self, factor: &NearFactor, loads: &[(u32, f32)]) -> bool {
-        let mut columns = loads.iter().map(|(dof, _)| dof / 3);
-        self.generation == factor.generation && columns.all(|c| self.columns.contains(&c))
-    }
-
-    /// What loads (mN) whose columns are known move in the core, and the modes by, mm; both lists are zero there before.
-    pub fn respond(&self, loads: &[(u32, f32)], (t, modes): (&mut [f32], &mut [f32])) {
-        modes.fill(0.0);
-        for &(dof, force) in loads {
-            let column = self.columns.iter().position(|c| *c == dof / 3);
-            let index = 3 * column.unwrap_or(0) + dof as usize % 3;
-            add(force, &self.moved[index * t.len()..], t);
-            add(force, &self.modes[index * modes.len()..], modes);
-        }
     }
 
     /// Makes those columns that are not known.

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use super::columns::{Response, SYMMETRIC};
+use super::columns::Response;
 use super::linear::WHAT;
 use super::step::{add, dot, resize};
 use super::{Gain, LocalSolver, StepContext, each_load};
@@ -147,16 +147,6 @@ impl LocalSolver {
         self.factor
             .take_off(env, (near, preconditioner), room, (t, p))?;
         preconditioner.respond_on_modes(env, p, &mut self.solved)?;
-        self.move_modes(step)
-    }
-
-    /// The direction takes on the core's answer, in `reduced.r`, and the modes', in `solved`, with the field that their move stretches over the core.
-    fn move_modes(&mut self, step: &mut StepContext<'_>) -> Result<()> {
-        let env = step.context.env();
-        let preconditioner = &*step.preconditioner;
-        let (near, room) = (&self.near, &mut self.room);
-        let core = 3 * near.core;
-        let t = &mut self.reduced.r[..core];
         add(1.0, &self.solved, &mut self.d.c);
         add(1.0, t, &mut self.d.t);
         preconditioner.near_coordinates(env, &self.solved, &near.ranges, &mut room.q);
@@ -218,42 +208,20 @@ impl LocalSolver {
     pub(super) fn respond(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
         self.reduced.clear(&self.near)?;
-        if self.columns.knows(&self.factor, &self.loads) {
-            self.take_columns(env);
-            self.move_modes(step)?;
-        } else {
-            let (near, reduced) = (&self.near, &mut self.reduced);
-            for &(dof, force) in &self.loads {
-                let node = env.prior.contact_nodes[dof as usize / 3];
-                if near.holds(node)
-                    && let Some(place) = near.place(node)
-                {
-                    reduced.r[3 * place + dof as usize % 3] += 1e3 * force;
-                }
+        let (near, reduced) = (&self.near, &mut self.reduced);
+        for &(dof, force) in &self.loads {
+            let node = env.prior.contact_nodes[dof as usize / 3];
+            if near.holds(node)
+                && let Some(place) = near.place(node)
+            {
+                reduced.r[3 * place + dof as usize % 3] += 1e3 * force;
             }
-            (step.preconditioner).work_of_modes(env, &self.loads, &mut reduced.p);
-            self.precondition(step)?;
         }
+        (step.preconditioner).work_of_modes(env, &self.loads, &mut reduced.p);
+        self.precondition(step)?;
         // The modes' part of it is decoded already.
         add(1.0, &self.room.linear, &mut self.d_modes);
         Ok(())
-    }
-
-    /// The first level's answer to `loads` whose columns are known: the core's in `reduced.r`, the modes' in `solved`, that of other inside nodes in the
-    /// direction.
-    fn take_columns(&mut self, env: Env<'_>) {
-        let (core, inside) = (3 * self.near.core, 3 * self.near.inside);
-        let core_moves = &mut self.reduced.r[..core];
-        (self.columns).respond(&self.loads, (core_moves, self.solved.as_mut_slice()));
-        for &(dof, force) in &self.loads {
-            let node = env.prior.contact_nodes[dof as usize / 3];
-            let at = 3 * self.near.place(node).unwrap_or(inside);
-            if (core..inside).contains(&at) {
-                let block = &env.time_step.inverse_blocks[node as usize];
-                let row = SYMMETRIC[dof as usize % 3].map(|entry| block[entry]);
-                add(1e3 * DIAGONAL_WEIGHT * force, &row, &mut self.d.t[at..]);
-            }
-        }
     }
 
     /// `Phi c` of the direction at the near nodes.
