@@ -39,24 +39,31 @@ pub struct Breathing {
 }
 
 impl Breath {
-    /// From now on, of a surface at rest with its triangles. The ball hangs at the node of the domain that is farthest down; a body that has been cut has none.
+    /// From now on, of a surface at rest with its triangles. The ball hangs at the node of the domain that the page shows lowest at first; a body that has been cut has none.
     pub fn begin(
         scene: &mut Scene,
         now: f64,
         (rest, faces): (&[[f32; 3]], &[u32]),
         domain: &[u32],
     ) -> Result<Self> {
-        let touched = (0..rest.len()).filter(|at| domain[*at] != 0);
-        let lowest = touched.min_by(|a, b| rest[*a][2].total_cmp(&rest[*b][2]));
         let side = |k: usize| {
             let along = rest.iter().map(|place| place[k]);
-            let ends = (
+            [
                 along.clone().fold(f32::MAX, f32::min),
                 along.fold(f32::MIN, f32::max),
-            );
-            ends.1 - ends.0
+            ]
         };
-        let longest = side(0).max(side(1)).max(side(2));
+        let sides = [0, 1, 2].map(side);
+        let longest = sides
+            .iter()
+            .fold(0.0f32, |most, [low, high]| most.max(high - low));
+        let touched = (0..rest.len()).filter(|at| domain[*at] != 0);
+        let sum: Vector = touched.clone().map(|at| Vector::from(rest[at])).sum();
+        let middle = sum / touched.clone().count().max(1) as f32;
+        let center = Vector::from(sides.map(|[low, high]| 0.5 * (low + high)));
+        let up = up_on_the_page(middle - center);
+        let height = |at: &usize| Vector::from(rest[*at]).dot(up);
+        let lowest = touched.min_by(|a, b| height(a).total_cmp(&height(b)));
         let radius = (RADIUS[0] * longest).min(RADIUS[1]);
         let hanging = match lowest {
             Some(at) => hang(scene, rest[at], outward(rest, faces, at as u32), radius)?,
@@ -132,6 +139,13 @@ impl Breath {
     }
 }
 
+/// What is up on the page, which looks at the organ against a direction.
+fn up_on_the_page(towards_the_eye: Vector) -> Vector {
+    let eye = towards_the_eye.normalize_or_zero();
+    let up = Vector::Z - eye * eye.z;
+    up.try_normalize().unwrap_or(Vector::Y)
+}
+
 /// The way out of the tissue at a node of its surface.
 fn outward(rest: &[[f32; 3]], faces: &[u32], node: u32) -> Vector {
     let own = faces.chunks_exact(3).filter(|face| face.contains(&node));
@@ -185,5 +199,13 @@ mod tests {
             (input.support_position[2], input.tie_count),
             (heights[1], 0)
         );
+    }
+
+    #[test]
+    fn up_on_the_page_is_up_as_far_as_the_eye_lets_it() {
+        assert_eq!(up_on_the_page(Vector::new(3.0, 0.0, 0.0)), Vector::Z);
+        let up = up_on_the_page(Vector::new(1.0, 0.0, 1.0));
+        assert!((up - Vector::new(-1.0, 0.0, 1.0).normalize()).length() < 1e-6);
+        assert_eq!(up_on_the_page(Vector::Z), Vector::Y);
     }
 }
