@@ -176,7 +176,8 @@ class Browser:
             if value:
                 return value
             time.sleep(0.05)
-        raise TimeoutError(condition)
+        state = self.run("return JSON.stringify(window.uptView)")
+        raise TimeoutError(f"{condition}: {state}")
 
     def drag(self, points: list[tuple[int, int]], release: bool) -> None:
         """The left button pressed at the first point, moved through the others, 100 ms each."""
