@@ -108,7 +108,7 @@ def a_blade_cuts_and_undo_heals():
 
 
 def press_beside(browser: Browser, x: int, y: int) -> None:
-    """Presses beside the cut; where a lip has opened, by how many steps the blade's way took, a tool may touch nothing."""
+    """Presses beside the cut: where a lip has opened, as the number of steps decides, it may touch nothing."""
     places = ((x - 10, y + 22), (x - 20, y + 30), (x + 15, y + 28))
     for at, (right, down) in enumerate(places):
         browser.drag([(right, down - 16), (right, down - 8), (right, down)], release=False)
