@@ -135,10 +135,11 @@ def the_mouse_operates(browser: Browser, bundle: Path, pictures: Path) -> None:
         browser.release()
         browser.wait("uptView.surfaces > 3")
         browser.screenshot(str(pictures / f"{bundle.name}-cut.png"))
-        area = browser.run("return uptView.area")
         browser.click("[data-kind=press]")
         browser.run("document.getElementById('radius').value = 3")
         press_beside(browser, x, y)
+        # Of the whole way of the blade, whose last step may have been on its way when it was let go.
+        area = browser.run("return uptView.area")
         browser.screenshot(str(pictures / f"{bundle.name}-opened.png"))
         browser.release()
         browser.click("[data-kind=aspirator]")
