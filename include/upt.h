@@ -1222,9 +1222,9 @@ typedef struct upt_cut {
    */
   float force[3];
   /**
-   * 0.
+   * 1: the body is another one, also where no area is new: its surface wants `upt_scene_update_surface` before it is read.
    */
-  uint32_t reserved;
+  uint32_t is_changed;
 } upt_cut;
 
 /**

@@ -1175,8 +1175,8 @@ class Cut(Record):
     """Volume that the body has lost, mm³."""
     force: tuple[float, ...] = vector("_force")
     """What the tissue does to the blade of `upt_scene_cut_with`, mN."""
-    reserved: int
-    """0."""
+    is_changed: int
+    """1: the body is another one, also where no area is new: its surface wants `upt_scene_update_surface` before it is read."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
@@ -1186,7 +1186,7 @@ class Cut(Record):
         ("area_mm2", ctypes.c_float),
         ("removed_mm3", ctypes.c_float),
         ("_force", ctypes.c_float * 3),
-        ("reserved", ctypes.c_uint32),
+        ("is_changed", ctypes.c_uint32),
     ]
 
 

@@ -205,7 +205,7 @@ pub unsafe extern "C" fn upt_scene_drop_fragments(
                 area_mm2: 0.0,
                 removed_mm3: volumes.iter().sum(),
                 force: [0.0; 3],
-                reserved: 0,
+                is_changed: u32::from(!volumes.is_empty()),
             })
         };
         // SAFETY: `out` points to a struct whose first field is its size, as the header asks.
@@ -232,7 +232,7 @@ unsafe fn report(
             area_mm2: cut.area_mm2,
             removed_mm3: cut.removed_mm3,
             force: cut.force,
-            reserved: 0,
+            is_changed: u32::from(cut.is_changed),
         })
     };
     // SAFETY: the caller's.

@@ -356,8 +356,8 @@ pub struct upt_cut {
     pub removed_mm3: f32,
     /// What the tissue does to the blade of `upt_scene_cut_with`, mN.
     pub force: [f32; 3],
-    /// 0.
-    pub reserved: u32,
+    /// 1: the body is another one, also where no area is new: its surface wants `upt_scene_update_surface` before it is read.
+    pub is_changed: u32,
 }
 
 /// A blade that feels the tissue. All zero: it feels nothing, and cuts whatever way it goes.

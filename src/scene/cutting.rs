@@ -15,6 +15,9 @@ use crate::error::Result;
 /// What an operation did to the body.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cut {
+    /// The body is another one: its surface wants to be updated ([`Scene::update_surface`]) before it is read. Ask this, not the area: an edge that goes along a
+    /// face opens nothing and fixes on which side of it tissue lies.
+    pub is_changed: bool,
     /// New area of a cut, mm².
     pub area_mm2: f32,
     /// Volume that the body has lost, mm³.
@@ -30,6 +33,7 @@ pub struct Cut {
 impl From<Change> for Cut {
     fn from(change: Change) -> Cut {
         Cut {
+            is_changed: change != Change::default(),
             area_mm2: change.area_mm2 as f32,
             removed_mm3: change.removed_mm3 as f32,
             force: change.force().map(|force| -force as f32),

@@ -6,7 +6,7 @@ use std::ptr::null_mut;
 use super::cuts::{liver, options, slit};
 use super::*;
 use upt::ffi::*;
-use upt::{Error, View};
+use upt::{Blade, Error, View};
 
 /// What a host keeps of a surface, from the C interface.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -117,6 +117,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         cut.struct_size = size_of::<upt_cut>() as u32;
         let status = upt_scene_cut(scene, 0, edge.as_flattened().as_ptr(), 2, 2, &mut cut);
         assert_eq!(status, UPT_OK, "{}", crate::host::message());
+        assert_eq!(cut.is_changed, 1);
         let mut nodes = 0;
         assert_eq!(upt_scene_read_node_count(scene, &mut nodes), UPT_OK);
         assert_eq!(nodes, cut.node_count);
@@ -214,4 +215,40 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
     let mut at = vec![0.0; 3 * update.vertices];
     let refused = own.surface_positions(&mut at);
     assert!(matches!(refused, Err(Error::Unsupported(_))), "{refused:?}");
+}
+
+/// A blade that goes over again what it has cut leaves the body, and so the surface that a host has, as it is; what it does change it says, also where
+/// nothing is laid open.
+#[test]
+fn a_cut_says_whether_the_body_is_another_one() {
+    let scene = Scene::new(liver(), &options()).unwrap();
+    scene.update_surface().unwrap();
+    let [a, b, c, d] = slit(&scene, 6.0, 15.0);
+    let blade = Blade {
+        energy: 10.0,
+        ..Blade::default()
+    };
+    // To and fro, and aside a little, as a hand holds it.
+    let edge = |at: usize| {
+        let part = (at % 160).min(160 - at % 160) as f32 / 80.0;
+        let aside = 0.3 * (at as f32).sin();
+        let moved = |from: f32, to: f32| from + part * (to - from) + aside;
+        [(a, c), (b, d)].map(|(from, to)| [0, 1, 2].map(|k| moved(from[k], to[k])))
+    };
+    let (mut area, mut idle) = (0.0, 0);
+    for at in 0..240 {
+        let poses = [edge(at), edge(at + 1)];
+        let cut = scene.cut_with(&blade, 0, 2, poses.as_flattened()).unwrap();
+        if cut.is_changed {
+            scene.update_surface().unwrap();
+        } else {
+            assert_eq!(cut, upt::Cut::default());
+            idle += 1;
+        }
+        area += cut.area_mm2;
+        let floats = scene.with_surface(|surface| 3 * surface.rest.len());
+        let mut places = vec![0.0; floats.unwrap()];
+        scene.surface_positions(&mut places).unwrap();
+    }
+    assert!(area > 100.0 && idle > 20, "{area} mm2, {idle}");
 }

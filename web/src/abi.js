@@ -405,7 +405,7 @@ export const upt_cut = {
     area_mm2: ["Float32", 24, 1],
     removed_mm3: ["Float32", 28, 1],
     force: ["Float32", 32, 3],
-    reserved: ["Uint32", 44, 1],
+    is_changed: ["Uint32", 44, 1],
   },
 };
 export const upt_blade = {

@@ -85,13 +85,16 @@ impl Body {
                     let new = area.min(all - *entry).max(0.0);
                     *entry += new;
                     change.area_mm2 += new;
-                    let at = middle(&met.cut);
-                    let part = Opened {
-                        element,
-                        at,
-                        area_mm2: new,
-                    };
-                    push(parts, part)?;
+                    // What its stroke has laid open before, the blade does not feel: nothing has then changed.
+                    if new > 0.0 {
+                        let at = middle(&met.cut);
+                        let part = Opened {
+                            element,
+                            at,
+                            area_mm2: new,
+                        };
+                        push(parts, part)?;
+                    }
                 }
                 if area <= 0.0 || before + area <= TOUCHED * whole {
                     parted.push(cell);

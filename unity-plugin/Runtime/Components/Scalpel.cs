@@ -37,7 +37,7 @@ namespace Upt
             if (Sweeps(poses))
             {
                 made = scene.CutWith(Sharp(tissue), stroke, poses, 2);
-                if (made.area_mm2 <= 0f) made = default(upt_cut);
+                if (made.is_changed == 0) made = default(upt_cut);
                 Keep();
             }
             return made;

@@ -49,7 +49,7 @@ namespace Upt
 
         private static unsafe void Add(upt_cut one, ref upt_cut all)
         {
-            if (one.area_mm2 <= 0f) return;
+            if (one.is_changed == 0) return;
             all.node_count = one.node_count;
             all.copied_count += one.copied_count;
             all.area_mm2 += one.area_mm2;

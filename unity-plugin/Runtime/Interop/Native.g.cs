@@ -586,8 +586,8 @@ namespace Upt.Interop
         public float removed_mm3;
         /// <summary>What the tissue does to the blade of `upt_scene_cut_with`, mN.</summary>
         public fixed float force[3];
-        /// <summary>0.</summary>
-        public uint reserved;
+        /// <summary>1: the body is another one, also where no area is new: its surface wants `upt_scene_update_surface` before it is read.</summary>
+        public uint is_changed;
     }
 
     /// <summary>A blade that feels the tissue. All zero: it feels nothing, and cuts whatever way it goes.</summary>
