@@ -107,21 +107,6 @@ def a_blade_cuts_and_undo_heals():
         go(lambda done: None, lambda now: now.steps > steps + 3)
 
 
-def press_beside(browser: Browser, x: int, y: int) -> None:
-    """Presses beside the cut: where a lip has opened, as the number of steps decides, it may touch nothing."""
-    places = ((x - 10, y + 22), (x - 20, y + 30), (x + 15, y + 28))
-    for at, (right, down) in enumerate(places):
-        browser.drag([(right, down - 16), (right, down - 8), (right, down)], release=False)
-        try:
-            browser.wait("uptView.largest > 2 && uptView.contacts > 0", seconds=15)
-            return
-        except TimeoutError as missed:
-            if at + 1 == len(places):
-                raise
-            print(f"nothing touched at {right}, {down}: {missed}")
-            browser.release()
-
-
 def the_mouse_operates(browser: Browser, bundle: Path, pictures: Path) -> None:
     with server(bundle) as (port, token):
         browser.open(f"http://127.0.0.1:{port}/?token={token}")
@@ -137,7 +122,8 @@ def the_mouse_operates(browser: Browser, bundle: Path, pictures: Path) -> None:
         browser.screenshot(str(pictures / f"{bundle.name}-cut.png"))
         browser.click("[data-kind=press]")
         browser.run("document.getElementById('radius').value = 3")
-        press_beside(browser, x, y)
+        browser.drag([(x - 10, y + 6), (x - 10, y + 14), (x - 10, y + 22)], release=False)
+        browser.wait("uptView.largest > 2 && uptView.contacts > 0")
         # Of the whole way of the blade, whose last step may have been on its way when it was let go.
         area = browser.run("return uptView.area")
         browser.screenshot(str(pictures / f"{bundle.name}-opened.png"))

@@ -192,7 +192,7 @@ impl Surgery {
         if std::mem::take(&mut self.effective) {
             let dropped = scene.drop_fragments()?;
             self.account.removed_mm3 += dropped.removed_mm3;
-            self.changed |= dropped.fragment_count > 0;
+            self.changed |= dropped.is_changed != 0;
         }
         Ok(())
     }
@@ -221,7 +221,7 @@ impl Surgery {
             return Ok(None);
         }
         let cut = scene.cut(FRACTURE_ENERGY, self.stroke, &edges)?;
-        Ok(Some(cut).filter(|cut| cut.area_mm2 > 0.0))
+        Ok(Some(cut).filter(|cut| cut.is_changed != 0))
     }
 
     fn coagulate(&mut self, scene: &mut Scene, tool: &Tool) -> Result<Option<ffi::upt_cut>> {
