@@ -70,3 +70,53 @@ fn calls_stay_within_the_stated_stack() {
         }
     }
 }
+
+/// Tools that press, leap and lie deep, whose steps take the longest ways through the code, and frames after them.
+#[cfg(feature = "instruments")]
+#[test]
+fn steps_with_tools_stay_within_the_stated_stack() {
+    use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, Shape, Tool, Vector, View};
+
+    fixture::find_runtime();
+    let brain = concat!(env!("CARGO_MANIFEST_DIR"), "/onnx/brain-coarse-reduced");
+    let scene = on_a_stack_of(OPEN, || {
+        let model = Model::open(brain.as_ref(), &ModelOptions::default()).unwrap();
+        let options = SceneOptions {
+            guard_policy: upt::GuardPolicy::Report,
+            ..SceneOptions::default()
+        };
+        Scene::new(model, &options).unwrap()
+    });
+    let mesh = scene.mesh();
+    let place = |node: u32| Vector::from_slice(&mesh.positions[3 * node as usize..][..3]);
+    let corners = mesh.domain_faces.as_chunks::<3>().0[0].map(place);
+    let [a, b, c] = corners;
+    let out = (b - a).cross(c - a).normalize();
+    let mut flags = 0;
+    for (depth, aside) in [
+        (0.0, 0.0),
+        (3.0, 0.0),
+        (6.0, 0.0),
+        (25.0, 0.0),
+        (25.0, 20.0),
+        (3.0, 0.0),
+    ] {
+        flags |= on_a_stack_of(STEP, || {
+            let at = a + out * (5.0 - depth) + (b - a).normalize() * aside;
+            let shape = Shape::Sphere { radius: 5.0 };
+            let tool = Tool::new(&shape, at.to_array(), [0.0, 0.0, 0.0, 1.0]).unwrap();
+            let tools = std::slice::from_ref(&tool);
+            scene.step(Contact::Tools(tools), None).unwrap();
+            let mut u = vec![0.0; 3 * scene.node_count()];
+            scene
+                .present(Contact::Tools(tools), 0.01, View::Region, &mut u)
+                .unwrap();
+            scene.stats().flags
+        });
+    }
+    assert_ne!(
+        flags & UPT_FLAG_FELL_BACK,
+        0,
+        "no step took the longest way"
+    );
+}
