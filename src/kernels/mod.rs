@@ -31,7 +31,7 @@ pub mod vectors;
 
 pub use lanes::{FlushToZero, Isa, MaskExceptions, flush};
 pub use math::gelu;
-pub use pool::{Pool, PoolError};
+pub use pool::{Pool, PoolError, THREAD_STACK};
 
 /// What a computation runs on.
 #[derive(Clone, Copy)]

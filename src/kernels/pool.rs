@@ -22,6 +22,9 @@ use lanes::{FlushToZero, Isa};
 use turns::Turns;
 use worker::{Job, Shared, Task, panic_message, worker_loop};
 
+/// Of the library's threads: as much as a program's first thread has. Two megabytes, the default of std, are not enough without optimisation.
+pub const THREAD_STACK: usize = 8 << 20;
+
 /// Bytes from which on streaming a table is split over threads. Waking a worker and waiting for its last chunk costs what
 /// one core reads in the meantime, some megabytes from cache. Measured (`cargo bench --bench kernels -- pool`, two cores that share
 /// their memory with others): reading alone gains nothing from a second thread up to 32 MB and loses below 4 MB; the products over the
@@ -100,6 +103,7 @@ impl Pool {
             let shared = Arc::clone(&pool.shared);
             let handle = std::thread::Builder::new()
                 .name(format!("upt-worker-{}", index + 1))
+                .stack_size(THREAD_STACK)
                 .spawn(move || worker_loop(&shared, isa, index + 1))
                 .map_err(|e| PoolError::Spawn {
                     index,

@@ -20,6 +20,7 @@ use crate::bundle::Mesh;
 use crate::contact::Tool;
 use crate::error::{Error, Result};
 use crate::field::{ContactSet, check_displacement};
+use crate::kernels::THREAD_STACK;
 use crate::memory;
 
 const SUBMITTED: &str = "a submitted input";
@@ -261,6 +262,7 @@ impl Worker {
         let (shared, signal) = (Arc::clone(shared), Arc::clone(&self.signal));
         let handle = std::thread::Builder::new()
             .name("upt-scene".into())
+            .stack_size(THREAD_STACK)
             .spawn(move || run(&shared, &signal))
             .map_err(|error| {
                 Error::State(format!("could not start the scene's worker: {error}"))
