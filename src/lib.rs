@@ -42,13 +42,10 @@ mod arrays;
 pub mod haptics;
 pub mod instrument;
 
-mod clock;
 mod features;
-mod field;
-mod memory;
-mod output;
-mod status;
-mod stored;
+
+// The layers below, under the names that the rooms here know them by.
+use ::field::{self, clock, memory, output, status, stored};
 
 // For the repository's own commands, benches and tests: no part of the interface, and it changes without notice.
 #[doc(hidden)]
@@ -60,19 +57,13 @@ pub mod corrections;
 #[doc(hidden)]
 pub mod envelope;
 #[doc(hidden)]
-pub mod error;
-#[doc(hidden)]
 pub mod ffi;
 #[doc(hidden)]
 pub mod forces;
 #[doc(hidden)]
 pub mod graph;
 #[doc(hidden)]
-pub mod grid;
-#[doc(hidden)]
 pub mod guard;
-#[doc(hidden)]
-pub mod kernels;
 #[doc(hidden)]
 pub mod library;
 #[doc(hidden)]
@@ -88,9 +79,15 @@ pub mod scene;
 #[doc(hidden)]
 pub mod stats;
 
+#[doc(hidden)]
+pub use ::field::{error, grid};
+#[doc(hidden)]
+pub use ::kernels;
+
 pub use ::contact::{End as TieEnd, Sample as TiePoint, Shape, ShapeError, Spring, Tie, Vector};
+#[doc(inline)]
+pub use ::field::{Error, Result};
 pub use contact::{ContactReport, MAX_TIES, MAX_TOOLS, Mode, Push, TieReading, Tool, ToolReading};
-pub use error::{Error, Result};
 pub use library::{init, shutdown};
 pub use model::{Kind, Model, ModelInfo};
 pub use onnx::providers_json;

@@ -27,17 +27,6 @@ use crate::model::Model;
 /// A cut body has at most as many copies as the mesh has nodes.
 const MOST_COPIES: usize = 1;
 
-impl From<TopologyError> for Error {
-    fn from(error: TopologyError) -> Error {
-        match error {
-            TopologyError::Kept => Error::Snapshot(error.to_string()),
-            TopologyError::NotFinite { .. } => Error::NonFinite(error.to_string()),
-            TopologyError::Memory { .. } => Error::OutOfMemory(error.to_string()),
-            other => Error::Argument(format!("cut: {other}")),
-        }
-    }
-}
-
 impl Core {
     /// Published states at rest, without region and points.
     pub(super) fn blank_published(&self) -> Result<Published> {

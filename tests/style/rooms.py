@@ -12,8 +12,7 @@ from pathlib import Path
 from structure.rust import ROOT, Crate
 
 ORDER = """
-    status clock error memory features stored output field options stats
-    kernels grid library bundle graph guard onnx
+    features options stats library bundle graph guard onnx
     prior envelope contact corrections forces instrument haptics
     model scene arrays ffi
 """.split()

@@ -64,7 +64,7 @@ def result(test: str, run: dict | None, rust: dict[str, str]) -> str:
 def failures() -> list[dict]:
     """Errors and flags with their meaning: how libupt fails, and how it says so."""
     found = []
-    for file in ("src/status.rs", "src/ffi/constants.rs"):
+    for file in ("crates/field/src/status.rs", "src/ffi/constants.rs"):
         doc: list[str] = []
         for line in (ROOT / file).read_text(encoding="utf-8").splitlines():
             if line.startswith("///"):

@@ -10,7 +10,7 @@ pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
 pub const FILES: [&str; 19] = [
-    "../status.rs",
+    "../../crates/field/src/status.rs",
     "constants.rs",
     "structs.rs",
     "step_structs.rs",

@@ -1,0 +1,86 @@
+//! Nested dissection (George, Nested dissection of a regular finite element mesh, SIAM J. Numer. Anal. 10, 1973): nodes are parted by the middle of their
+//! longest extent, and those of one half that are coupled with the other are eliminated after both.
+
+use std::ops::Range;
+
+use super::{BlockRows, Front, NONE, SparseFactor, WHAT};
+use field::error::Result;
+use field::memory;
+
+/// Nodes that are not parted any more.
+const LEAF: usize = 16;
+
+impl SparseFactor {
+    /// Orders a range of places, whose nodes are coupled with no others but later ones; its fronts come after all others.
+    pub(super) fn dissect(
+        &mut self,
+        matrix: &BlockRows,
+        points: &[[f32; 3]],
+        range: Range<usize>,
+    ) -> Result<()> {
+        if range.len() <= LEAF {
+            return self.push_front(range, (0, 1));
+        }
+        let nodes = &mut self.order[range.clone()];
+        let extent = |axis: usize| {
+            let values = nodes.iter().map(|node| points[*node as usize][axis]);
+            let (low, high) = values.fold((f32::MAX, f32::MIN), |(low, high), x| {
+                (low.min(x), high.max(x))
+            });
+            high - low
+        };
+        let extents = [0, 1, 2].map(extent);
+        let axis = (0..3).fold(0, |best, axis| match extents[axis] > extents[best] {
+            true => axis,
+            false => best,
+        });
+        let middle = nodes.len() / 2;
+        nodes.select_nth_unstable_by(middle, |a, b| {
+            let at = |node: &u32| points[*node as usize][axis];
+            at(a).total_cmp(&at(b)).then(a.cmp(b))
+        });
+        // Which half a node is in: 0, 1; 2 for those of the second that touch the first.
+        for &node in &nodes[..middle] {
+            self.local[node as usize] = 0;
+        }
+        for &node in &nodes[middle..] {
+            self.local[node as usize] = 1;
+        }
+        for &node in &nodes[middle..] {
+            let touches = |column: &u32| self.local.get(*column as usize) == Some(&0);
+            if matrix.row(node as usize).iter().any(touches) {
+                self.local[node as usize] = 2;
+            }
+        }
+        let local = &mut self.local;
+        nodes[middle..].sort_unstable_by_key(|node| (local[*node as usize], *node));
+        let parted = nodes[middle..].partition_point(|node| local[*node as usize] == 1);
+        for &node in nodes.iter() {
+            local[node as usize] = NONE;
+        }
+        let (start, end) = (range.start, range.end);
+        let (middle, parted) = (start + middle, start + middle + parted);
+        let before = self.fronts.len();
+        let mut children = 1;
+        self.dissect(matrix, points, start..middle)?;
+        if parted > middle {
+            self.dissect(matrix, points, middle..parted)?;
+            children += 1;
+        }
+        let tree = self.fronts.len() - before + 1;
+        self.push_front(parted..end, (children, tree as u32))
+    }
+
+    fn push_front(&mut self, own: Range<usize>, (children, tree): (u32, u32)) -> Result<()> {
+        let front = Front {
+            first: own.start as u32,
+            own: own.len() as u32,
+            border: 0,
+            border_count: 0,
+            upper: 0,
+            children,
+            tree,
+        };
+        memory::push(&mut self.fronts, front, WHAT)
+    }
+}

@@ -1,0 +1,334 @@
+//! The decoder's weights as the micro-kernels read them: packed once a model
+//! ([`PackedDecoder`]), keys and values once a step ([`DecoderTokens`]).
+//!
+//! A packed matrix `[out,in]` is groups of eight outputs, `[out/8][in][8]`, zeros behind the last
+//! output. The affine parts of LN_2 and LN_3 are folded into `W_1` and `W_3`; the attention's
+//! `1/sqrt(h/heads)` and the `log2 e` of its exponential are folded into the keys.
+
+use super::pack::{GROUP, block_count, pack, pack_blocks, pack_pairs, pair_count, panel_floats};
+use super::precision::DecoderPrecision;
+use field::error::Error;
+use field::memory::{self, HeldBytes};
+use half::bf16;
+
+/// The decoder's tensors as stored in `weights.safetensors`; matrices `[out,in]` row-major.
+#[derive(Debug, Clone, Copy)]
+pub struct DecoderWeights<'a> {
+    /// `h`.
+    pub hidden: usize,
+    /// Attention heads; divides `h`.
+    pub heads: usize,
+    /// `m`.
+    pub mlp: usize,
+    /// `decoder.attention_out.weight [h,h]`, `.bias [h]`.
+    pub attention_out: (&'a [f32], &'a [f32]),
+    /// `decoder.norm2.weight [h]`, `.bias [h]`.
+    pub norm2: (&'a [f32], &'a [f32]),
+    /// `decoder.mlp1.weight [m,h]`, `.bias [m]`.
+    pub mlp1: (&'a [f32], &'a [f32]),
+    /// `decoder.mlp2.weight [h,m]`, `.bias [h]`.
+    pub mlp2: (&'a [f32], &'a [f32]),
+    /// `decoder.norm3.weight [h]`, `.bias [h]`.
+    pub norm3: (&'a [f32], &'a [f32]),
+    /// `decoder.head.weight [3,h]`, `.bias [3]`.
+    pub head: (&'a [f32], &'a [f32]),
+}
+
+/// `W x + b` ready for the micro-kernel.
+#[derive(Debug, Default, HeldBytes)]
+pub(super) struct Linear {
+    pub depth: usize,
+    /// `[out,in]`, for the scalar reference.
+    pub plain: Vec<f32>,
+    /// `[out/8][in][8]`.
+    pub panels: Vec<f32>,
+    /// `[out/8][in/2][8][2]`, for bf16 on vectors.
+    pub pairs: Vec<bf16>,
+    /// `[out/16][in/32][16][32]`, for bf16 on matrix tiles; empty where the machine has none.
+    pub blocks: Vec<bf16>,
+    /// `[out]`, zeros up to a multiple of 8.
+    pub bias: Vec<f32>,
+}
+
+/// A matrix in bf16, in both layouts.
+#[derive(Clone, Copy)]
+pub(super) struct Narrow<'a> {
+    pub outputs: usize,
+    pub pairs: &'a [bf16],
+    pub blocks: &'a [bf16],
+}
+
+impl Linear {
+    /// The weights in bf16.
+    pub(super) fn narrow(&self) -> Narrow<'_> {
+        Narrow {
+            outputs: self.bias.len(),
+            pairs: &self.pairs,
+            blocks: &self.blocks,
+        }
+    }
+
+    fn new(
+        outputs: usize,
+        depth: usize,
+        weight: Vec<f32>,
+        mut bias: Vec<f32>,
+    ) -> field::error::Result<Self> {
+        let rows = outputs.next_multiple_of(GROUP);
+        memory::fit(&mut bias, rows, WHAT)?;
+        bias.resize(rows, 0.0);
+        let mut linear = Self {
+            depth,
+            bias,
+            panels: memory::zeros(panel_floats(outputs, depth), WHAT)?,
+            pairs: memory::filled(pair_count(outputs, depth), bf16::ZERO, WHAT)?,
+            blocks: memory::filled(block_count(outputs, depth), bf16::ZERO, WHAT)?,
+            ..Self::default()
+        };
+        pack(&mut linear.panels, outputs, depth, |o, k| {
+            weight[o * depth + k]
+        });
+        pack_pairs(&mut linear.pairs, outputs, depth, |o, k| {
+            weight[o * depth + k]
+        });
+        pack_blocks(&mut linear.blocks, outputs, depth, |o, k| {
+            weight[o * depth + k]
+        });
+        linear.plain = weight;
+        Ok(linear)
+    }
+
+    /// `W LN(y) + b` where `LN` has a scale and a shift, as a layer on the plain normalised `y`.
+    fn after_norm(
+        outputs: usize,
+        depth: usize,
+        layer: Tensors<'_>,
+        norm: Tensors<'_>,
+    ) -> field::error::Result<Self> {
+        let mut weight = memory::copied(layer.0, WHAT)?;
+        let mut bias = memory::copied(layer.1, WHAT)?;
+        for o in 0..outputs {
+            let row = &mut weight[o * depth..][..depth];
+            let shift: f64 = row
+                .iter()
+                .zip(norm.1)
+                .map(|(w, b)| f64::from(*w) * f64::from(*b))
+                .sum();
+            bias[o] += shift as f32;
+            row.iter_mut().zip(norm.0).for_each(|(w, g)| *w *= g);
+        }
+        Self::new(outputs, depth, weight, bias)
+    }
+}
+
+const WHAT: &str = "the decoder's weights";
+
+type Tensors<'a> = (&'a [f32], &'a [f32]);
+
+/// The decoder of a model, packed. Immutable; shared by scenes and threads.
+#[derive(Debug, HeldBytes)]
+pub struct PackedDecoder {
+    pub(super) hidden: usize,
+    pub(super) heads: usize,
+    pub(super) mlp: usize,
+    pub(super) attention_out: Linear,
+    pub(super) mlp1: Linear,
+    pub(super) mlp2: Linear,
+    pub(super) head: Linear,
+}
+
+impl PackedDecoder {
+    /// Packs a model's decoder.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] of `file`, naming the tensor whose length does not fit; [`Error::OutOfMemory`].
+    pub fn new(file: &str, w: &DecoderWeights<'_>) -> field::error::Result<Self> {
+        let (h, m) = (w.hidden, w.mlp);
+        if h == 0 || w.heads == 0 || !h.is_multiple_of(w.heads) {
+            let problem = format!("decoder width {h} is not a multiple of {} heads", w.heads);
+            return Err(Error::bundle(file, problem));
+        }
+        for (name, tensors, outputs, depth) in [
+            ("attention_out", w.attention_out, h, h),
+            ("norm2", w.norm2, h, 1),
+            ("mlp1", w.mlp1, m, h),
+            ("mlp2", w.mlp2, h, m),
+            ("norm3", w.norm3, h, 1),
+            ("head", w.head, 3, h),
+        ] {
+            if tensors.0.len() != outputs * depth || tensors.1.len() != outputs {
+                let problem = format!(
+                    "decoder.{name} has {} weights and {} biases, not {} and {outputs}",
+                    tensors.0.len(),
+                    tensors.1.len(),
+                    outputs * depth
+                );
+                return Err(Error::bundle(file, problem));
+            }
+        }
+        let plain = |t: Tensors<'_>, o, d| {
+            let (weight, bias) = (memory::copied(t.0, WHAT)?, memory::copied(t.1, WHAT)?);
+            Linear::new(o, d, weight, bias)
+        };
+        Ok(Self {
+            hidden: h,
+            heads: w.heads,
+            mlp: m,
+            attention_out: plain(w.attention_out, h, h)?,
+            mlp1: Linear::after_norm(m, h, w.mlp1, w.norm2)?,
+            mlp2: plain(w.mlp2, h, m)?,
+            head: Linear::after_norm(3, h, w.head, w.norm3)?,
+        })
+    }
+
+    /// `h`.
+    pub fn hidden(&self) -> usize {
+        self.hidden
+    }
+
+    /// Multiplications and additions of one node, two a multiply-add.
+    pub fn flops(&self, tokens: usize) -> usize {
+        let h = self.hidden;
+        2 * (2 * h * tokens + h * h + 2 * h * self.mlp + 3 * h)
+    }
+}
+
+/// One step's keys and values, packed. Made once ([`DecoderTokens::new`]), filled each step
+/// without allocation ([`DecoderTokens::set`]).
+#[derive(Debug, HeldBytes)]
+pub struct DecoderTokens {
+    tokens: usize,
+    hidden: usize,
+    heads: usize,
+    /// Scaled keys `[L,h]`, for the scalar reference.
+    pub(super) keys: Vec<f32>,
+    /// `[L,h]`.
+    pub(super) values: Vec<f32>,
+    /// A head after another: `[L, h/heads]` as panels.
+    pub(super) key_panels: Vec<f32>,
+    /// A head after another: `[h/heads, L]` as panels.
+    pub(super) value_panels: Vec<f32>,
+    key_pairs: Vec<bf16>,
+    value_pairs: Vec<bf16>,
+    key_blocks: Vec<bf16>,
+    value_blocks: Vec<bf16>,
+}
+
+impl DecoderTokens {
+    /// Room for `tokens = L` latent tokens; zeros until [`DecoderTokens::set`].
+    pub fn new(decoder: &PackedDecoder, tokens: usize) -> Self {
+        Self::try_new(decoder, tokens).expect("memory for the decoder's tokens")
+    }
+
+    /// As [`DecoderTokens::new`].
+    ///
+    /// # Errors
+    /// [`field::Error::OutOfMemory`].
+    pub fn try_new(decoder: &PackedDecoder, tokens: usize) -> field::error::Result<Self> {
+        const WHAT: &str = "the decoder's tokens";
+        let (h, heads) = (decoder.hidden, decoder.heads);
+        let width = h / heads;
+        let (key_pairs, value_pairs) = (pair_count(tokens, width), pair_count(width, tokens));
+        let (key_blocks, value_blocks) = (block_count(tokens, width), block_count(width, tokens));
+        Ok(Self {
+            tokens,
+            hidden: h,
+            heads,
+            keys: memory::zeros(tokens * h, WHAT)?,
+            values: memory::zeros(tokens * h, WHAT)?,
+            key_panels: memory::zeros(heads * panel_floats(tokens, width), WHAT)?,
+            value_panels: memory::zeros(heads * panel_floats(width, tokens), WHAT)?,
+            key_pairs: memory::filled(heads * key_pairs, bf16::ZERO, WHAT)?,
+            value_pairs: memory::filled(heads * value_pairs, bf16::ZERO, WHAT)?,
+            key_blocks: memory::filled(heads * key_blocks, bf16::ZERO, WHAT)?,
+            value_blocks: memory::filled(heads * value_blocks, bf16::ZERO, WHAT)?,
+        })
+    }
+
+    /// Takes a step's `keys [L,h]` and `values [L,h]`, the outputs of `latent.onnx`.
+    ///
+    /// # Panics
+    /// If they have another length.
+    pub fn set(&mut self, precision: DecoderPrecision, keys: &[f32], values: &[f32]) {
+        let (h, tokens, width) = (self.hidden, self.tokens, self.hidden / self.heads);
+        assert_eq!(keys.len(), tokens * h, "keys must be [L, h]");
+        assert_eq!(values.len(), tokens * h, "values must be [L, h]");
+        let scale = std::f32::consts::LOG2_E / (width as f32).sqrt();
+        for (to, from) in self.keys.iter_mut().zip(keys) {
+            *to = from * scale;
+        }
+        self.values.copy_from_slice(values);
+        for head in 0..self.heads {
+            let column = head * width;
+            let key = |l: usize, k: usize| self.keys[l * h + column + k];
+            let value = |o: usize, l: usize| values[l * h + column + o];
+            let (k, v) = (panel_floats(tokens, width), panel_floats(width, tokens));
+            pack(&mut self.key_panels[head * k..][..k], tokens, width, key);
+            pack(
+                &mut self.value_panels[head * v..][..v],
+                width,
+                tokens,
+                value,
+            );
+            let (kp, vp) = (pair_count(tokens, width), pair_count(width, tokens));
+            let (kb, vb) = (block_count(tokens, width), block_count(width, tokens));
+            match precision {
+                DecoderPrecision::F32 => {}
+                DecoderPrecision::Bf16Vectors => {
+                    pack_pairs(&mut self.key_pairs[head * kp..][..kp], tokens, width, key);
+                    pack_pairs(
+                        &mut self.value_pairs[head * vp..][..vp],
+                        width,
+                        tokens,
+                        value,
+                    );
+                }
+                DecoderPrecision::Bf16Tiles => {
+                    pack_blocks(&mut self.key_blocks[head * kb..][..kb], tokens, width, key);
+                    pack_blocks(
+                        &mut self.value_blocks[head * vb..][..vb],
+                        width,
+                        tokens,
+                        value,
+                    );
+                }
+            }
+        }
+    }
+
+    /// A head's keys in bf16, `[L, h/heads]`.
+    pub(super) fn keys_of(&self, head: usize) -> Narrow<'_> {
+        let (tokens, width) = (self.tokens, self.hidden / self.heads);
+        let (pairs, blocks) = (pair_count(tokens, width), block_count(tokens, width));
+        Narrow {
+            outputs: tokens,
+            pairs: &self.key_pairs[head * pairs..][..pairs],
+            blocks: &self.key_blocks[head * blocks..][..blocks],
+        }
+    }
+
+    /// A head's values in bf16, `[h/heads, L]`.
+    pub(super) fn values_of(&self, head: usize) -> Narrow<'_> {
+        let (tokens, width) = (self.tokens, self.hidden / self.heads);
+        let (pairs, blocks) = (pair_count(width, tokens), block_count(width, tokens));
+        Narrow {
+            outputs: width,
+            pairs: &self.value_pairs[head * pairs..][..pairs],
+            blocks: &self.value_blocks[head * blocks..][..blocks],
+        }
+    }
+
+    /// `L`.
+    pub fn len(&self) -> usize {
+        self.tokens
+    }
+
+    /// Whether there are no tokens.
+    pub fn is_empty(&self) -> bool {
+        self.tokens == 0
+    }
+
+    pub(super) fn hidden(&self) -> usize {
+        self.hidden
+    }
+}
