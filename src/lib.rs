@@ -49,8 +49,6 @@ use ::field::{self, clock, memory, output, status, stored};
 
 // For the repository's own commands, benches and tests: no part of the interface, and it changes without notice.
 #[doc(hidden)]
-pub mod bundle;
-#[doc(hidden)]
 pub mod contact;
 #[doc(hidden)]
 pub mod corrections;
@@ -73,16 +71,14 @@ pub mod onnx;
 #[doc(hidden)]
 pub mod options;
 #[doc(hidden)]
-pub mod prior;
-#[doc(hidden)]
 pub mod scene;
 #[doc(hidden)]
 pub mod stats;
 
 #[doc(hidden)]
-pub use ::field::{error, grid};
+pub use ::{bundle, kernels, prior};
 #[doc(hidden)]
-pub use ::kernels;
+pub use ::field::{error, grid};
 
 pub use ::contact::{End as TieEnd, Sample as TiePoint, Shape, ShapeError, Spring, Tie, Vector};
 #[doc(inline)]

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+pub use crate::bundle::limits::*;
+
 /// Where a stage's graph runs (values of `UPT_PROVIDER_*`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(i32)]
@@ -34,20 +36,6 @@ impl Provider {
             Provider::TensorRtRtx => "tensorrt-rtx",
         }
     }
-}
-
-/// Arithmetic of the heavy stages (values of `UPT_PRECISION_*`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(i32)]
-pub enum Precision {
-    /// Plain float32.
-    F32 = 0,
-    /// bfloat16 products, float32 sums, on CPUs that have them.
-    Bf16 = 1,
-    /// float16 tables or graphs.
-    F16 = 2,
-    /// int8 weights, where the bundle carries `*.int8.onnx`.
-    Int8 = 3,
 }
 
 /// What runs the decoder of a `upt` bundle (values of `UPT_KERNEL_*`).
@@ -225,21 +213,6 @@ pub struct SceneOptions {
     /// than the bundle's, corrections by the elements make all steps, with contact and without.
     pub damping_per_s: f64,
 }
-
-/// Most corrections of a step.
-pub(crate) const MOST_CORRECTIONS: u32 = 64;
-/// Most substeps of a step.
-pub(crate) const MOST_SUBSTEPS: u32 = 8;
-/// Bounds of [`SceneOptions::step_s`], s.
-pub const SHORTEST_STEP_S: f64 = 0.01;
-/// See [`SHORTEST_STEP_S`].
-pub const LONGEST_STEP_S: f64 = 0.05;
-/// The largest gravity, in each direction, m/s².
-pub const LARGEST_GRAVITY: f32 = 1e3;
-/// Bounds of [`SceneOptions::damping_per_s`], 1/s.
-pub const SMALLEST_DAMPING_PER_S: f64 = 0.01;
-/// See [`SMALLEST_DAMPING_PER_S`].
-pub const LARGEST_DAMPING_PER_S: f64 = 1000.0;
 
 /// How many corrections a step gets while there is contact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

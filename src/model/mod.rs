@@ -24,6 +24,7 @@ pub use upt_stages::DECODER_TILE;
 use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, NodeSet, Place};
 use crate::corrections::Corrections;
 use crate::error::Result;
+use crate::features::HAS_INSTRUMENTS;
 use crate::kernels::{FlushToZero, Isa};
 use crate::library::{self, Alive};
 use crate::memory::HeldBytes;
@@ -293,7 +294,11 @@ impl Model {
             },
             memory_bytes: (own + prior + self.mesh.held_bytes()) as u64,
             load_seconds: self.load_seconds,
-            frame_step_s: self.manifest.frame_step_s(),
+            // A build without instruments presents no frames between steps.
+            frame_step_s: match HAS_INSTRUMENTS {
+                true => self.manifest.frame_step_s(),
+                false => self.manifest.dt_s,
+            },
         }
     }
 

@@ -12,7 +12,10 @@ import sys
 
 from structure.rust import ROOT, Crate
 
-CRATES = [".", *(f"crates/{name}" for name in "contact elements exchange field kernels lanes topology".split())]
+CRATES = [
+    ".",
+    *(f"crates/{name}" for name in "bundle contact elements exchange field kernels lanes prior topology".split()),
+]
 
 # Exact in IEEE 754, and so not among them: sqrt, mul_add, abs, floor. `powi` of a constant is products.
 FUNCTIONS = (

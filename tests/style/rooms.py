@@ -12,8 +12,8 @@ from pathlib import Path
 from structure.rust import ROOT, Crate
 
 ORDER = """
-    features options stats library bundle graph guard onnx
-    prior envelope contact corrections forces instrument haptics
+    features options stats library graph guard onnx
+    envelope contact corrections forces instrument haptics
     model scene arrays ffi
 """.split()
 

@@ -1,0 +1,127 @@
+//! The mesh of a body that has been cut.
+
+use std::sync::OnceLock;
+
+use topology::{Body, Changes};
+
+use super::mesh::{Mesh, unique};
+use super::node_set::NodeSet;
+use field::error::Result;
+use field::memory;
+
+const WHAT: &str = "the mesh of a cut body";
+
+/// What is left of a set of nodes: those that have elements around them, and of the copies those that stem from one of the set.
+fn cut_set(set: &NodeSet, body: &Body, is_left: &dyn Fn(u32) -> bool) -> Result<NodeSet> {
+    let own = body.mesh().node_count() as u32;
+    let (mut nodes, mut rows) = (Vec::new(), Vec::new());
+    let copies = own..body.node_count() as u32;
+    for node in set.nodes.iter().copied().chain(copies) {
+        if let (Ok(row), true) = (set.nodes.binary_search(&body.parent(node)), is_left(node)) {
+            memory::push(&mut nodes, node, WHAT)?;
+            memory::push(&mut rows, row as u32, WHAT)?;
+        }
+    }
+    Ok(NodeSet {
+        name: set.name.clone(),
+        nodes,
+        rows,
+    })
+}
+
+impl Mesh {
+    /// This mesh as a body that was made of it is now: copies of nodes behind the mesh's own; elements without those that have changed, and behind them the
+    /// cells of these. Nodes that nothing is left around are held. Boundary triangles, their areas and the hash stay those of the intact mesh.
+    ///
+    /// # Errors
+    /// [`field::Error::OutOfMemory`].
+    pub fn cut(&self, body: &Body, changes: &Changes) -> Result<Mesh> {
+        let (count, own) = (body.node_count(), self.node_count());
+        let Changes { gone, new } = changes;
+        let mut positions = memory::room(3 * count, WHAT)?;
+        positions.extend_from_slice(&self.positions);
+        for &parent in body.parents() {
+            positions.extend(self.position(parent));
+        }
+        let most = self.tets.len() / 4 + new.len();
+        let mut tets = memory::room(4 * most, WHAT)?;
+        let mut stiffness = memory::room(most, WHAT)?;
+        let ends = gone.iter().map(|element| *element as usize);
+        let mut start = 0;
+        for end in ends.chain([self.tets.len() / 4]) {
+            tets.extend_from_slice(&self.tets[4 * start..4 * end]);
+            match self.stiffness.is_empty() {
+                true => stiffness.resize(stiffness.len() + end - start, 1.0),
+                false => stiffness.extend_from_slice(&self.stiffness[start..end]),
+            }
+            start = end + 1;
+        }
+        for element in new {
+            tets.extend(element.nodes);
+            stiffness.push(self.stiffness_of(element));
+        }
+        let faces = body.touchable_of(self.domain_sides(body)?)?;
+        let domain_faces = memory::copied(faces.as_flattened(), WHAT)?;
+        let mut left = memory::room(4 * new.len(), WHAT)?;
+        left.extend(new.iter().flat_map(|element| element.nodes));
+        let left = unique(left);
+        let mesh = body.mesh();
+        let is_left = |node: u32| {
+            let is_around = |element: &u32| gone.binary_search(element).is_err();
+            let stays = (node as usize) < own && mesh.around(node).iter().any(is_around);
+            stays || left.binary_search(&node).is_ok()
+        };
+        let corners = gone.iter().flat_map(|element| mesh.tet(*element));
+        let copies = own as u32..count as u32;
+        let mut held_nodes = memory::copied(&self.held_nodes, WHAT)?;
+        for node in corners.chain(copies) {
+            let is_held = self.held_nodes.binary_search(&body.parent(node)).is_ok();
+            if is_held || !is_left(node) {
+                memory::push(&mut held_nodes, node, WHAT)?;
+            }
+        }
+        let mut supports = memory::room(self.supports.len(), WHAT)?;
+        for set in &self.supports {
+            supports.push(cut_set(set, body, &is_left)?);
+        }
+        let mut node_area = memory::room(count, WHAT)?;
+        node_area.extend_from_slice(&self.node_area);
+        node_area.resize(count, 0.0);
+        Ok(Mesh {
+            positions,
+            tets,
+            stiffness,
+            surface_faces: memory::copied(&self.surface_faces, WHAT)?,
+            domain_nodes: unique(memory::copied(&domain_faces, WHAT)?),
+            domain_faces,
+            surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
+            held_nodes: unique(held_nodes),
+            supports,
+            regions: Vec::new(),
+            node_area,
+            sha256: self.sha256.clone(),
+            domain_sides: OnceLock::new(),
+        })
+    }
+
+    /// Stiffness over the material's of an element that one of this mesh's has become, its share with it.
+    pub fn stiffness_of(&self, element: &topology::Element) -> f32 {
+        let own = self.stiffness.get(element.parent as usize).copied();
+        own.unwrap_or(1.0) * element.stiffness * element.share as f32
+    }
+
+    fn domain_sides(&self, body: &Body) -> Result<&[(u32, u8)]> {
+        if let Some(sides) = self.domain_sides.get() {
+            return Ok(sides);
+        }
+        let mut domain = memory::room(self.domain_faces.len() / 3, WHAT)?;
+        for face in self.domain_faces.as_chunks::<3>().0 {
+            let mut corners = *face;
+            corners.sort_unstable();
+            domain.push(corners);
+        }
+        domain.sort_unstable();
+        let sides = (body.mesh()).border(|corners| domain.binary_search(&corners).is_ok())?;
+        Ok(self.domain_sides.get_or_init(|| sides))
+    }
+}

@@ -1,0 +1,301 @@
+//! `mesh.safetensors`: the tetrahedral mesh of a bundle, checked, and the node sets that follow from it.
+
+use std::sync::OnceLock;
+
+use sha2::{Digest, Sha256};
+
+use super::files::hex;
+use super::manifest::Boundary;
+use super::node_set::NodeSet;
+use super::tensors::TensorFile;
+use field::error::{Error, Result};
+use field::memory::{self, HeldBytes};
+use safetensors::Dtype;
+
+const WHAT: &str = "a mesh";
+/// Support groups at most.
+const MOST_SUPPORTS: usize = 64;
+
+/// A checked mesh; lengths in mm.
+#[derive(Debug, HeldBytes)]
+pub struct Mesh {
+    /// Rest positions `[K,3]`.
+    pub positions: Vec<f32>,
+    /// Tetrahedra `[T,4]`.
+    pub tets: Vec<u32>,
+    /// Young's modulus of each tetrahedron over the material's `[T]`; empty where the body is uniform.
+    pub stiffness: Vec<f32>,
+    /// Boundary triangles `[F,3]`, outward.
+    pub surface_faces: Vec<u32>,
+    /// Triangles of the domain `[D,3]`.
+    pub domain_faces: Vec<u32>,
+    /// Nodes of the boundary triangles, ascending.
+    pub surface_nodes: Vec<u32>,
+    /// Nodes of the domain's triangles, ascending.
+    pub domain_nodes: Vec<u32>,
+    /// Nodes held at zero, ascending.
+    pub held_nodes: Vec<u32>,
+    /// Parts of them that move apart from the others.
+    pub supports: Vec<NodeSet>,
+    /// Named parts of the surface.
+    pub regions: Vec<NodeSet>,
+    /// A third of the area of each node's boundary triangles `[K]`, mm^2.
+    pub node_area: Vec<f32>,
+    /// The mesh hash of `docs/reference/formats.md`.
+    pub sha256: String,
+    /// The domain's triangles as faces of elements, from the first cut on.
+    #[held(skip)]
+    pub(super) domain_sides: OnceLock<Vec<(u32, u8)>>,
+}
+
+impl Mesh {
+    /// Reads and checks a mesh.
+    pub fn parse(file: &TensorFile, boundary: Boundary) -> Result<Mesh> {
+        let text = file.text();
+        if text.get("format").map(String::as_str) != Some("upt-mesh") {
+            return Err(Error::bundle(
+                file.name(),
+                "metadata `format` must be `upt-mesh`",
+            ));
+        }
+        if text.get("version").map(String::as_str) != Some("1") {
+            return Err(Error::Version(format!(
+                "{}: metadata `version` is {:?}, this library reads version 1",
+                file.name(),
+                text.get("version")
+            )));
+        }
+        let positions = file.f32("positions", &[None, Some(3)])?;
+        let count = positions.len() / 3;
+        if count < 4 {
+            return Err(file.bad("positions", "needs at least 4 nodes"));
+        }
+        let tets = file.indices("tets", &[None, Some(4)], count)?;
+        if let Some(at) = tets
+            .chunks_exact(4)
+            .position(|tet| volume(&positions, tet) <= 0.0)
+        {
+            return Err(file.bad("tets", format!("element {at} has no positive volume")));
+        }
+        let stiffness = if file.has("stiffness") {
+            file.f32("stiffness", &[Some(tets.len() / 4)])?
+        } else {
+            Vec::new()
+        };
+        if let Some(tet) = stiffness.iter().position(|&factor| factor <= 0.0) {
+            let problem = format!("element {tet} is {}, must be positive", stiffness[tet]);
+            return Err(file.bad("stiffness", problem));
+        }
+        let surface_faces = file.indices("surface", &[None, Some(3)], count)?;
+        let domain = if file.has("domain") {
+            file.indices("domain", &[None], surface_faces.len() / 3)?
+        } else {
+            Vec::new()
+        };
+        let corners = domain.iter().flat_map(|&face| {
+            surface_faces[3 * face as usize..3 * face as usize + 3]
+                .iter()
+                .copied()
+        });
+        let domain_faces = memory::collected(3 * domain.len(), corners, WHAT)?;
+        let set = |name: &str| {
+            if file.has(name) {
+                file.ascending(name, count)
+            } else {
+                Ok(Vec::new())
+            }
+        };
+        let fixed = set("fixed")?;
+        let supported = set("supported")?;
+        let mut hash = Sha256::new();
+        hash.update(file.raw("positions", Dtype::F32, &[None, Some(3)])?);
+        hash.update(file.raw("tets", Dtype::I32, &[None, Some(4)])?);
+        for name in ["fixed", "supported"] {
+            if file.has(name) {
+                hash.update(file.raw(name, Dtype::I32, &[None])?);
+            }
+        }
+        if file.has("stiffness") {
+            hash.update(file.raw("stiffness", Dtype::F32, &[None])?);
+        }
+        let mut held_nodes = fixed;
+        if boundary == Boundary::Supported {
+            memory::reserve(&mut held_nodes, supported.len(), WHAT)?;
+            held_nodes.extend(supported);
+        }
+        Ok(Mesh {
+            node_area: node_area(&positions, &surface_faces)?,
+            surface_nodes: unique(memory::copied(&surface_faces, WHAT)?),
+            domain_nodes: unique(memory::copied(&domain_faces, WHAT)?),
+            held_nodes: unique(held_nodes),
+            positions,
+            tets,
+            stiffness,
+            surface_faces,
+            domain_faces,
+            sha256: hex(&hash.finalize()),
+            domain_sides: OnceLock::new(),
+            supports: Vec::new(),
+            regions: Vec::new(),
+        })
+    }
+
+    /// Takes the support groups and the regions of the bundle that it is of.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] with the group or region.
+    pub fn take_named(&mut self, supports: &[NodeSet], regions: &[NodeSet]) -> Result<()> {
+        self.take_supports(supports)?;
+        self.take_regions(regions)
+    }
+
+    /// Takes the support groups of the bundle that it is of.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] with the group.
+    fn take_supports(&mut self, groups: &[NodeSet]) -> Result<()> {
+        let bad = |index: usize, problem: String| {
+            Err(Error::bundle(
+                "bundle.json",
+                format!("field `supports[{index}]` {problem}"),
+            ))
+        };
+        if groups.len() > MOST_SUPPORTS {
+            return bad(MOST_SUPPORTS, format!("is one more than {MOST_SUPPORTS}"));
+        }
+        for (index, group) in groups.iter().enumerate() {
+            let others = &groups[..index];
+            if group.name.is_empty() || others.iter().any(|other| other.name == group.name) {
+                return bad(
+                    index,
+                    format!("has the name `{}`, must have one of its own", group.name),
+                );
+            }
+            if group.nodes.is_empty() || !group.nodes.is_sorted_by(|a, b| a < b) {
+                return bad(index, "must have nodes, ascending".into());
+            }
+            for node in &group.nodes {
+                if self.held_nodes.binary_search(node).is_err() {
+                    return bad(index, format!("has node {node}, which is not held"));
+                }
+                if others
+                    .iter()
+                    .any(|other| other.nodes.binary_search(node).is_ok())
+                {
+                    return bad(index, format!("has node {node}, which another group has"));
+                }
+            }
+        }
+        self.supports = memory::collected(groups.len(), groups.iter().cloned(), WHAT)?;
+        Ok(())
+    }
+
+    /// Takes the named regions of the bundle that it is of.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] with the region.
+    fn take_regions(&mut self, regions: &[NodeSet]) -> Result<()> {
+        let bad = |index: usize, problem: String| {
+            Err(Error::bundle(
+                "bundle.json",
+                format!("field `regions[{index}]` {problem}"),
+            ))
+        };
+        if regions.len() > MOST_SUPPORTS {
+            return bad(MOST_SUPPORTS, format!("is one more than {MOST_SUPPORTS}"));
+        }
+        for (index, region) in regions.iter().enumerate() {
+            let mut others = regions[..index].iter();
+            if region.name.is_empty() || others.any(|other| other.name == region.name) {
+                return bad(
+                    index,
+                    format!("has the name `{}`, must have one of its own", region.name),
+                );
+            }
+            let is_in = |node: &u32| region.nodes.binary_search(node).is_ok();
+            let faces = self.surface_faces.as_chunks::<3>().0;
+            if !region.nodes.is_sorted_by(|a, b| a < b)
+                || !faces.iter().any(|face| face.iter().all(is_in))
+            {
+                return bad(
+                    index,
+                    "must have the nodes of at least one boundary triangle, ascending".into(),
+                );
+            }
+            if let Some(node) =
+                (region.nodes.iter()).find(|node| **node as usize >= self.node_count())
+            {
+                return bad(index, format!("has node {node}, which the mesh lacks"));
+            }
+        }
+        self.regions = memory::collected(regions.len(), regions.iter().cloned(), WHAT)?;
+        Ok(())
+    }
+
+    /// Number of nodes, `K`.
+    pub fn node_count(&self) -> usize {
+        self.positions.len() / 3
+    }
+
+    /// Rest position of a node, mm.
+    pub fn position(&self, node: u32) -> [f32; 3] {
+        let i = 3 * node as usize;
+        [
+            self.positions[i],
+            self.positions[i + 1],
+            self.positions[i + 2],
+        ]
+    }
+}
+
+pub(super) fn unique(mut nodes: Vec<u32>) -> Vec<u32> {
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+fn at(positions: &[f32], node: u32) -> [f64; 3] {
+    let i = 3 * node as usize;
+    [
+        positions[i] as f64,
+        positions[i + 1] as f64,
+        positions[i + 2] as f64,
+    ]
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Six times the signed volume of a tetrahedron.
+pub fn volume(positions: &[f32], tet: &[u32]) -> f64 {
+    let origin = at(positions, tet[0]);
+    let [a, b, c] = [1, 2, 3].map(|k| minus(at(positions, tet[k]), origin));
+    let n = cross(a, b);
+    n[0] * c[0] + n[1] * c[1] + n[2] * c[2]
+}
+
+fn node_area(positions: &[f32], faces: &[u32]) -> Result<Vec<f32>> {
+    let count = positions.len() / 3;
+    let mut area = memory::filled(count, 0.0f64, WHAT)?;
+    for face in faces.chunks_exact(3) {
+        let origin = at(positions, face[0]);
+        let n = cross(
+            minus(at(positions, face[1]), origin),
+            minus(at(positions, face[2]), origin),
+        );
+        let third = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt() / 6.0;
+        for &node in face {
+            area[node as usize] += third;
+        }
+    }
+    memory::collected(count, area.into_iter().map(|a| a as f32), WHAT)
+}

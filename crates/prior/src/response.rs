@@ -1,0 +1,162 @@
+//! The contact solve: collision field -> contact forces -> linear response in block coordinates.
+
+use super::table::PriorTable;
+use field::error::{Error, Result};
+use field::memory::{self, HeldBytes};
+use kernels::contact::ContactFactor;
+use kernels::respond::accumulate_rows;
+use kernels::rows::Stored;
+use kernels::{Isa, Pool};
+
+/// Contact nodes for which the factor has room from the start; larger sets allocate once.
+const ROOM: usize = 256;
+
+/// What a solve met.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct SolveReport {
+    /// A contact node is held, or outside of the domain and without a column of its own.
+    pub outside: bool,
+    /// The contact block was near singular and a Tikhonov term was added.
+    pub regularised: bool,
+}
+
+/// Contact forces, and the factor that is kept while the contact nodes stay the same.
+#[derive(Debug, HeldBytes)]
+pub struct ContactResponse {
+    factor: ContactFactor,
+    factored: Vec<u32>,
+    regularised: bool,
+    pub(super) columns: Vec<u32>,
+    rows: Vec<u32>,
+    /// The rows of the tables that they are.
+    stored: Vec<u32>,
+    values: Vec<f32>,
+    widened: Vec<f32>,
+    pub(super) forces: Vec<f32>,
+    // By column, zero between calls: sum of imposed displacements, how many, whether the column's own node is among them.
+    sum: Vec<[f32; 3]>,
+    pub(super) count: Vec<u32>,
+    pub(super) own: Vec<bool>,
+}
+
+impl ContactResponse {
+    /// Buffers for a table.
+    pub fn new(table: &PriorTable) -> Result<ContactResponse> {
+        const WHAT: &str = "the contact solve";
+        let columns = table.contact_nodes.len();
+        Ok(ContactResponse {
+            factor: ContactFactor::try_with_capacity(3 * columns.min(ROOM))?,
+            factored: memory::room(3 * columns, WHAT)?,
+            regularised: false,
+            columns: memory::room(columns, WHAT)?,
+            rows: memory::room(3 * columns, WHAT)?,
+            stored: memory::room(3 * columns, WHAT)?,
+            values: memory::room(3 * columns, WHAT)?,
+            widened: memory::zeros(6 * table.widest_block(), WHAT)?,
+            forces: memory::room(3 * columns, WHAT)?,
+            sum: memory::filled(columns, [0.0; 3], WHAT)?,
+            count: memory::filled(columns, 0, WHAT)?,
+            own: memory::filled(columns, false, WHAT)?,
+        })
+    }
+
+    /// Solves for the forces. A node without a column of its own lends its displacement to the nearest column (the
+    /// mean of all that borrow it); a column's own node goes before borrowers; held nodes are left out.
+    pub fn solve(
+        &mut self,
+        isa: Isa,
+        table: &PriorTable,
+        held: &[bool],
+        nodes: &[u32],
+        vectors: &[f32],
+    ) -> Result<SolveReport> {
+        let mut report = SolveReport::default();
+        self.columns.clear();
+        for (&node, c) in nodes.iter().zip(vectors.chunks_exact(3)) {
+            let Some((slot, own)) = table.column_for(held, node) else {
+                report.outside = true;
+                continue;
+            };
+            report.outside |= !own && !table.in_domain[node as usize];
+            if self.count[slot] == 0 {
+                self.columns.push(slot as u32);
+            }
+            if self.own[slot] {
+                continue;
+            }
+            if own {
+                self.own[slot] = true;
+                self.sum[slot] = [c[0], c[1], c[2]];
+                self.count[slot] = 1;
+            } else {
+                let sum = &mut self.sum[slot];
+                *sum = [sum[0] + c[0], sum[1] + c[1], sum[2] + c[2]];
+                self.count[slot] += 1;
+            }
+        }
+        self.columns.sort_unstable();
+        self.rows.clear();
+        self.values.clear();
+        for &column in &self.columns {
+            let slot = column as usize;
+            for axis in 0..3 {
+                self.rows.push(3 * column + axis as u32);
+                self.values
+                    .push(self.sum[slot][axis] / self.count[slot] as f32);
+            }
+            self.sum[slot] = [0.0; 3];
+            self.count[slot] = 0;
+            self.own[slot] = false;
+        }
+        self.stored.clear();
+        self.stored
+            .extend(self.rows.iter().map(|row| table.stored_dof(*row)));
+        if self.rows != self.factored {
+            self.factored.clear();
+            self.regularised = false;
+            if !self.rows.is_empty() {
+                self.factor.reserve(self.rows.len())?;
+                let made = self
+                    .factor
+                    .factor(isa, &self.rows, |upper| {
+                        table.gather_compliance(&self.columns, upper, &mut self.widened);
+                    })
+                    .map_err(|error| Error::bundle("prior.safetensors", error.to_string()))?;
+                self.regularised = made.regularised();
+            }
+            self.factored.extend_from_slice(&self.rows);
+        }
+        report.regularised = self.regularised && !self.rows.is_empty();
+        self.forces.clear();
+        self.forces.resize(self.rows.len(), 0.0);
+        if !self.rows.is_empty() {
+            self.factor.solve(isa, &self.values, &mut self.forces);
+        }
+        Ok(report)
+    }
+
+    /// Contact forces of the last solve, mN, three a column.
+    pub fn forces(&self) -> &[f32] {
+        &self.forces
+    }
+
+    /// The field of the last solve in block coordinates, `q = sum_i f_i response[i]`.
+    pub fn field(&self, isa: Isa, pool: &Pool, table: &PriorTable, q: &mut [f32]) -> Result<()> {
+        if self.rows.is_empty() || q.is_empty() {
+            q.fill(0.0);
+            return Ok(());
+        }
+        let forces = (self.stored.as_slice(), self.forces.as_slice());
+        table.response.accumulate(isa, pool, forces, false, q)
+    }
+
+    /// The forces through a table of `[3D,n]`, for instance `force_to_z`.
+    pub fn expand(&self, isa: Isa, pool: &Pool, table: Stored<'_>, out: &mut [f32]) -> Result<()> {
+        if self.rows.is_empty() || out.is_empty() {
+            out.fill(0.0);
+            return Ok(());
+        }
+        let (rows, forces) = (&self.stored, &self.forces);
+        Ok(accumulate_rows(isa, pool, table, rows, forces, false, out)?)
+    }
+}
