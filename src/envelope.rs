@@ -3,6 +3,7 @@
 //! REQ-022: A contact outside of what the model was trained on raises its flag, and one inside does not.
 
 use crate::bundle::{Envelope, Mesh, ToolEnvelope};
+use crate::contact::ToolUse;
 use crate::error::Result;
 use crate::field::ContactSet;
 use crate::memory::{self, HeldBytes};
@@ -21,17 +22,6 @@ pub struct EnvelopeReport {
     pub ratio: f32,
     /// Largest `|c|`, mm.
     pub max_push: f32,
-}
-
-/// The tools that push in a step, as the envelope sees them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ToolUse {
-    /// Smallest and largest of their sizes (half their smallest extent), mm.
-    pub size_mm: [f32; 2],
-    /// Of the fastest point of any of them, mm/s.
-    pub speed_mm_s: f32,
-    /// How many push.
-    pub count: usize,
 }
 
 /// Contact patches of a mesh, found by its surface edges; kept while the contact nodes stay the same.

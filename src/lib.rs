@@ -49,10 +49,6 @@ use ::field::{self, clock, memory, output, status, stored};
 
 // For the repository's own commands, benches and tests: no part of the interface, and it changes without notice.
 #[doc(hidden)]
-pub mod contact;
-#[doc(hidden)]
-pub mod corrections;
-#[doc(hidden)]
 pub mod envelope;
 #[doc(hidden)]
 pub mod ffi;
@@ -79,6 +75,8 @@ pub mod stats;
 pub use ::{bundle, kernels, prior};
 #[doc(hidden)]
 pub use ::field::{error, grid};
+#[doc(hidden)]
+pub use implicit::{contact, corrections};
 
 pub use ::contact::{End as TieEnd, Sample as TiePoint, Shape, ShapeError, Spring, Tie, Vector};
 #[doc(inline)]

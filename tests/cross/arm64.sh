@@ -53,7 +53,7 @@ installed() {
 
 # The lanes: kernels of elements, contact and the library.
 quick_tests() {
-  unit_tests -p libupt-elements -p libupt-contact -p libupt-exchange -p libupt-field -p libupt-kernels -p libupt-bundle -p libupt-prior -p libupt-lanes --lib --tests
+  unit_tests -p libupt-elements -p libupt-contact -p libupt-exchange -p libupt-field -p libupt-kernels -p libupt-bundle -p libupt-prior -p libupt-implicit -p libupt-lanes --lib --tests
   unit_tests -p libupt --lib
   leave_out "$(tests_in tests crates/tissue)" "tests of the library's calls and of the reference solver: nightly"
 }

@@ -42,7 +42,7 @@ tests_in() {
 
 echo "== unit tests"
 if [ "$nightly" = 1 ]; then
-  unit_tests -p libupt -p tissue -p libupt-elements -p libupt-contact -p libupt-exchange -p libupt-field -p libupt-kernels -p libupt-bundle -p libupt-prior -p libupt-lanes --no-default-features --features libupt/default --lib --tests
+  unit_tests -p libupt -p tissue -p libupt-elements -p libupt-contact -p libupt-exchange -p libupt-field -p libupt-kernels -p libupt-bundle -p libupt-prior -p libupt-implicit -p libupt-lanes --no-default-features --features libupt/default --lib --tests
   echo "== equilibria, by the sparse factorisation"
   unit_tests -p tissue --lib
 else

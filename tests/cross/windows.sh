@@ -41,7 +41,7 @@ installed() {
 
 # The processor's lanes are those of Linux: what every run tests is the platform.
 quick_tests() {
-  leave_out "$(tests_in src tests crates/tissue crates/elements crates/contact crates/exchange crates/field crates/kernels crates/bundle crates/prior crates/lanes)" "tests of the crates: nightly"
+  leave_out "$(tests_in src tests crates/tissue crates/elements crates/contact crates/exchange crates/field crates/kernels crates/bundle crates/prior crates/implicit crates/lanes)" "tests of the crates: nightly"
 }
 
 quick_bundles() {

@@ -12,10 +12,8 @@ import sys
 
 from structure.rust import ROOT, Crate
 
-CRATES = [
-    ".",
-    *(f"crates/{name}" for name in "bundle contact elements exchange field kernels lanes prior topology".split()),
-]
+LAYERS = "bundle contact elements exchange field implicit kernels lanes prior topology".split()
+CRATES = [".", *(f"crates/{layer}" for layer in LAYERS)]
 
 # Exact in IEEE 754, and so not among them: sqrt, mul_add, abs, floor. `powi` of a constant is products.
 FUNCTIONS = (

@@ -13,7 +13,7 @@ from structure.rust import ROOT, Crate
 
 ORDER = """
     features options stats library graph guard onnx
-    envelope contact corrections forces instrument haptics
+    envelope forces instrument haptics
     model scene arrays ffi
 """.split()
 

@@ -146,7 +146,7 @@ impl ImplicitSolver {
         Ok(())
     }
 
-    /// Makes the free step from `input.last`, of shorter ones where the scene has them for that; each with at least [`LEAST_SWING`] iterations
+    /// Makes the free step from `input.last`, of shorter ones where the scene has them for that; each with at least `LEAST_SWING` iterations
     /// that its time lets in.
     ///
     /// # Errors

@@ -22,7 +22,7 @@ impl ContactProblem {
         parts.fold(1.0, f32::max).min(MOST_PARTS) as u32
     }
 
-    /// The part of `parts` to take after part `part`: the next, or one of [`LEAST_PARTS`] once the solves have taken their time.
+    /// The part of `parts` to take after part `part`: the next, or one of `LEAST_PARTS` once the solves have taken their time.
     pub fn next_part(&self, part: u32, parts: u32) -> u32 {
         let stride = match self.work.is_spent() {
             true => parts.div_ceil(self.least_parts()),

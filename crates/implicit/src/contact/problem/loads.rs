@@ -4,11 +4,11 @@ use ::contact::Vector;
 use ::contact::grasp::tension;
 
 use super::ContactProblem;
+use crate::contact::ToolUse;
 use crate::contact::past::Force;
 use crate::contact::state::{State, vector};
 use crate::contact::ties::NO_TOOL;
 use crate::contact::tool::{ContactReport, Push, ToolReading};
-use crate::envelope::ToolUse;
 
 /// No grasp pulls harder than this, mN: soft tissue tears before.
 const STRONGEST_GRASP_MN: f32 = 10_000.0;

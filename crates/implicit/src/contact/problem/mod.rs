@@ -190,7 +190,7 @@ impl ContactProblem {
     }
 
     /// Exchanges the responses of the contact for those of another length of step, on which they depend.
-    pub(crate) fn exchange(&mut self, responses: &mut Delassus) {
+    pub fn exchange(&mut self, responses: &mut Delassus) {
         std::mem::swap(&mut self.delassus, responses);
     }
 

@@ -75,7 +75,7 @@ impl ContactProblem {
     /// As [`ContactProblem::solve`] at the tools' ends, with what does not depend on how long ago the step was kept from call to call.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`crate::Error::OutOfMemory`].
     pub fn solve_between(
         &mut self,
         compliance: Compliance<'_>,
@@ -88,7 +88,7 @@ impl ContactProblem {
     /// their way. Gives what has changed.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`crate::Error::OutOfMemory`].
     pub fn solve(
         &mut self,
         compliance: Compliance<'_>,
@@ -294,7 +294,7 @@ impl ContactProblem {
     /// The state is taken as that under half of the last forces; the other half is solved for again.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`crate::Error::OutOfMemory`].
     pub fn prescribe(
         &mut self,
         compliance: Compliance<'_>,

@@ -28,7 +28,7 @@ impl ContactProblem {
     /// Keeps the forces as those of the first guess.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`crate::Error::OutOfMemory`].
     pub fn keep_guess(&mut self) -> Result<()> {
         memory::replace(&mut self.guessed, &self.next.forces, WHAT)
     }
@@ -42,7 +42,7 @@ impl ContactProblem {
     /// Keeps the forces as those of a state without inverted elements.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`crate::Error::OutOfMemory`].
     pub fn keep_sound(&mut self) -> Result<()> {
         memory::replace(&mut self.sound, &self.next.forces, WHAT)
     }

@@ -14,7 +14,7 @@ use crate::memory::HeldBytes;
 /// Ties of a scene at most.
 pub const MAX_TIES: usize = 256;
 /// The tool of a tie's force: none.
-pub(crate) const NO_TOOL: u32 = u32::MAX;
+pub const NO_TOOL: u32 = u32::MAX;
 /// The number of the first tie's row.
 const FIRST_ROW: u32 = u32::MAX - MAX_TIES as u32;
 
@@ -107,12 +107,12 @@ impl From<Sample> for RowNodes {
 }
 
 /// The number of a tie's row.
-pub(crate) fn row_of(index: usize) -> u32 {
+pub fn row_of(index: usize) -> u32 {
     FIRST_ROW + index as u32
 }
 
 /// Which tie a row is.
-pub(crate) fn tie_of(row: u32) -> Option<usize> {
+pub fn tie_of(row: u32) -> Option<usize> {
     row.checked_sub(FIRST_ROW).map(|index| index as usize)
 }
 
@@ -147,7 +147,7 @@ impl Points<'_> {
 
 /// The ties of a step on their way.
 #[derive(Clone, Copy)]
-pub(crate) struct Pulling<'a> {
+pub struct Pulling<'a> {
     pub ties: &'a [Placed],
     pub held: &'a [HeldTie],
     /// Where their far ends were at the start of the step.
@@ -211,12 +211,7 @@ impl Pulling<'_> {
 ///
 /// # Errors
 /// [`Error::Argument`], [`Error::NonFinite`], with the field.
-pub(crate) fn check(
-    ties: &[Tie],
-    tools: usize,
-    nodes: usize,
-    moves: impl Fn(u32) -> bool,
-) -> Result<()> {
+pub fn check(ties: &[Tie], tools: usize, nodes: usize, moves: impl Fn(u32) -> bool) -> Result<()> {
     if ties.len() > MAX_TIES {
         return Err(Error::Argument(format!(
             "ties has {} entries, must have at most {MAX_TIES}",

@@ -13,18 +13,18 @@ pub struct State<'a> {
     pub start: &'a [f32],
 }
 
-pub(crate) fn vector(field: &[f32], node: u32) -> Vector {
+pub fn vector(field: &[f32], node: u32) -> Vector {
     let at = 3 * node as usize;
     Vector::new(field[at], field[at + 1], field[at + 2])
 }
 
 impl State<'_> {
-    pub(crate) fn position(&self, node: u32) -> Vector {
+    pub fn position(&self, node: u32) -> Vector {
         self.place(self.u, node)
     }
 
     /// Where a node was when the step began.
-    pub(crate) fn position_before(&self, node: u32) -> Vector {
+    pub fn position_before(&self, node: u32) -> Vector {
         self.place(self.start, node)
     }
 

@@ -85,7 +85,7 @@ impl Tool {
     }
 
     /// Whether another tool is this one at the same place, told from their bits; equal hulls made twice are two.
-    pub(crate) fn is_same(&self, other: &Tool) -> bool {
+    pub fn is_same(&self, other: &Tool) -> bool {
         let bits = |tool: &Tool| {
             let (at, turn) = (tool.pose.translation, tool.pose.rotation);
             let [x, y, z] = at.to_array();

@@ -26,7 +26,8 @@ struct Bench {
 
 impl Bench {
     fn open() -> Bench {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/brain-coarse-reduced");
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+            .join("onnx/brain-coarse-reduced");
         let files = BundleFiles::open(&folder).unwrap();
         let manifest = &files.manifest;
         let file = files.tensors(&manifest.mesh.file).unwrap();

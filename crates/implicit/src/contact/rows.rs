@@ -43,27 +43,27 @@ pub(super) struct Row {
 }
 
 /// The tissue's outward normal at the face of a sample.
-pub(crate) fn outward(samples: &Samples, sample: u32, state: State<'_>) -> Vector {
+pub fn outward(samples: &Samples, sample: u32, state: State<'_>) -> Vector {
     let corners = samples.corners(samples.face_of(sample));
     let [a, b, c] = corners.map(|at| state.position(samples.nodes()[at as usize]));
     (b - a).cross(c - a).normalize_or_zero()
 }
 
 /// A tool on its way from one pose to another, and a sample that it may touch.
-pub(crate) struct Pair<'a> {
-    pub(crate) body: &'a Body,
+pub struct Pair<'a> {
+    pub body: &'a Body,
     /// Coulomb's coefficient.
-    pub(crate) friction: f32,
-    pub(crate) from: &'a Pose,
-    pub(crate) now: &'a Pose,
+    pub friction: f32,
+    pub from: &'a Pose,
+    pub now: &'a Pose,
     /// Place of a held sample in the tool's frame.
-    pub(crate) anchor: Option<Vector>,
+    pub anchor: Option<Vector>,
     /// The tool was put where it is: nobody knows which way it came.
-    pub(crate) put: bool,
+    pub put: bool,
     /// The tool is so quick or thin that it may go past a sample between two looks.
-    pub(crate) swept: bool,
+    pub swept: bool,
     /// The tool lies in the tissue: unit direction of the shortest way out.
-    pub(crate) way_out: Option<Vector>,
+    pub way_out: Option<Vector>,
 }
 
 impl Pair<'_> {
@@ -71,13 +71,7 @@ impl Pair<'_> {
     ///
     /// It comes out of the tool where it is nearest to its surface, unless the tool has gone through the tissue's surface there: then
     /// into the tissue, the way that the tool came, to the tool's far side, be the tool still there or farther on.
-    pub(crate) fn contact(
-        &self,
-        point: Vector,
-        start: Vector,
-        outward: Vector,
-        force: Vector,
-    ) -> Contact {
+    pub fn contact(&self, point: Vector, start: Vector, outward: Vector, force: Vector) -> Contact {
         let nearest = self.body.nearest_at(self.now, point);
         if let Some(place) = self.anchor {
             return Contact {

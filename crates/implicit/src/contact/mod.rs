@@ -30,13 +30,15 @@ pub mod state;
 mod stored;
 pub mod ties;
 pub mod tool;
+mod tool_use;
 
 pub use compliance::{Compliance, Tangent};
-pub(crate) use delassus::Delassus;
+pub use delassus::Delassus;
 pub use past::{Force, Past};
 pub use problem::ContactProblem;
-pub(crate) use rows::{Pair, outward};
+pub use rows::{Pair, outward};
 pub use state::State;
-pub(crate) use state::vector;
+pub use state::vector;
 pub use ties::{HeldTie, MAX_TIES, Placed, Points};
 pub use tool::{ContactReport, MAX_TOOLS, Mode, PUT_MM, Push, TieReading, Tool, ToolReading};
+pub use tool_use::ToolUse;

@@ -24,7 +24,7 @@ pub struct Motion {
     pub load: Vec<f32>,
     /// Smallest det F of the last corrected state.
     pub min_det: f32,
-    /// How far from the tools the next step iterates, a level of the near set (`src/corrections/local/near.rs`).
+    /// How far from the tools the next step iterates, a level of the near set (`crates/implicit/src/corrections/local/near.rs`).
     pub level: u32,
     /// What a step of this length leaves out in the last state, and the whole estimated error of it, before the bundle's
     /// calibration: root mean squares over the nodes, mm. The error is 0 where nothing was corrected.

@@ -141,23 +141,33 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::{Model, ModelOptions};
+    use crate::bundle::{BundleFiles, Mesh};
+    use crate::corrections::Corrections;
+    use crate::kernels::Isa;
+    use crate::prior::PriorTable;
 
     /// Rows at a time are those of the whole matrix that a step of that length would have, also after samples and times have changed.
     #[test]
     fn rows_are_those_of_the_whole_matrix() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/tiny-corrected");
-        let model = Model::open(&path, &ModelOptions::default()).unwrap();
-        let (prior, space) = (
-            model.prior.as_ref().unwrap(),
-            &model.corrections().unwrap().space,
-        );
-        let mut held = vec![false; model.mesh.positions.len() / 3];
-        for &node in &model.mesh.held_nodes {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+            .join("tests/fixtures/tiny-corrected");
+        let files = BundleFiles::open(&path).unwrap();
+        let manifest = &files.manifest;
+        let tensors = files.tensors(&manifest.mesh.file).unwrap();
+        let mesh = Mesh::parse(&tensors, manifest.boundary).unwrap();
+        let prior = PriorTable::open(&files, manifest.prior.as_ref().unwrap(), &mesh).unwrap();
+        let corrections = Corrections::open(&files, &mesh, Some(&prior), Isa::detect()).unwrap();
+        let (prior, space) = (&prior, &corrections.space);
+        let mut held = vec![false; mesh.node_count()];
+        for &node in &mesh.held_nodes {
             held[node as usize] = true;
         }
-        let samples = model.samples().unwrap();
-        let points = Points::from(&*samples);
+        let places = mesh.positions.as_chunks().0;
+        let faces = mesh.domain_faces.as_chunks().0;
+        let samples =
+            ::contact::Samples::try_new(places, faces, &mesh.held_nodes, ::contact::SPACING_MM);
+        let samples = samples.unwrap();
+        let points = Points::from(&samples);
         let count = samples.rows().len() as u32;
         let mut own = InertialCompliance::default();
         let mut between = Delassus::default();
