@@ -11,17 +11,47 @@ use crate::kernels::parts::Parts;
 const BEND: f64 = 0.02;
 const JERK: f64 = 0.05;
 
+/// BDF2's differences of one number: what a node's displacement or velocity was, and is.
+#[derive(Clone, Copy)]
+struct Differences {
+    /// `1 / 2h`, 1/s.
+    half: f32,
+    /// 0 where the past is not known: its velocities count as none.
+    known: f32,
+}
+
+impl Differences {
+    fn new(step_s: f64, input: &Input<'_>) -> Differences {
+        Differences {
+            half: (0.5 / step_s) as f32,
+            known: if input.still { 0.0 } else { 1.0 },
+        }
+    }
+
+    /// `(3 x_{n+1} - 4 x_n + x_{n-1}) / 2h`, by the differences, which are small where the numbers are not.
+    #[inline(always)]
+    fn rate(self, [next, last, before]: [f32; 3]) -> f32 {
+        (3.0 * (next - last) - (last - before)) * self.half
+    }
+
+    /// Velocity, and acceleration from it and the two velocities before.
+    #[inline(always)]
+    fn motion(self, displacements: [f32; 3], [v_n, v_before]: [f32; 2]) -> [f32; 2] {
+        let v = self.rate(displacements);
+        [v, self.rate([v, self.known * v_n, self.known * v_before])]
+    }
+}
+
 impl ImplicitSolver {
     /// Inertia and damping of the step at the last displacement, less the loads.
     pub(super) fn prepare(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<()> {
         let env = context.env();
         let (last, before) = (input.last, input.before);
-        let known = if input.still { 0.0 } else { 1.0 };
         let Integrator {
             step_s,
             damping_per_s,
         } = context.time_step.integrator;
-        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
+        let (bdf2, alpha) = (Differences::new(step_s, input), damping_per_s as f32);
         let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
         let len = self.drift.len();
         let drift = Parts::new(&mut self.drift);
@@ -33,10 +63,8 @@ impl ImplicitSolver {
             let velocity_before = &motion.velocity_before[range.clone()];
             let mass = &mass[range];
             for i in 0..drift.len() {
-                let v = (before[i] - last[i]) * half;
-                let v_n = known * velocity[i];
-                let v_before = known * velocity_before[i];
-                let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
+                let displacements = [last[i], last[i], before[i]];
+                let [v, a] = bdf2.motion(displacements, [velocity[i], velocity_before[i]]);
                 drift[i] = mass[i] * (a + alpha * v);
             }
         })?;
@@ -78,8 +106,7 @@ impl ImplicitSolver {
             step_s,
             damping_per_s,
         } = context.time_step.integrator;
-        let (half, alpha) = ((0.5 / step_s) as f32, damping_per_s as f32);
-        let known = if input.still { 0.0 } else { 1.0 };
+        let (bdf2, alpha) = (Differences::new(step_s, input), damping_per_s as f32);
         let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
         let time = step_s as f32;
         let mut sums = passes::Sums::new(&mut self.partial, next.len(), 2);
@@ -99,19 +126,17 @@ impl ImplicitSolver {
             let known_before = &motion.velocity_before[range.clone()];
             let (next, mass) = (&next[range.clone()], &mass[range]);
             for i in 0..next.len() {
-                let v = (3.0 * (next[i] - last[i]) - (last[i] - before[i])) * half;
-                let v_n = known * known_v[i];
-                let v_before = known * known_before[i];
-                let a = (3.0 * (v - v_n) - (v_n - v_before)) * half;
+                let displacements = [next[i], last[i], before[i]];
+                let [v, a] = bdf2.motion(displacements, [known_v[i], known_before[i]]);
                 velocity[i] = v;
-                velocity_before[i] = v_n;
+                velocity_before[i] = bdf2.known * known_v[i];
                 inertia[i] = mass[i] * (a + alpha * v);
             }
             // SAFETY: these sums belong to this piece alone.
             let sums = unsafe { parts.part(2 * piece, 2) };
             sums[0] = passes::sum_of_squares(next.len(), |i| next[i] - 2.0 * last[i] + before[i]);
             sums[1] = passes::sum_of_squares(next.len(), |i| {
-                time * (velocity[i] - 2.0 * velocity_before[i] + known * known_before[i])
+                time * (velocity[i] - 2.0 * velocity_before[i] + bdf2.known * known_before[i])
             });
         })?;
         let nodes = (next.len() / 3) as f64;

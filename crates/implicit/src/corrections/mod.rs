@@ -22,6 +22,7 @@ mod history;
 mod input;
 mod integrate;
 mod lift;
+mod line_search;
 mod load;
 mod loading;
 mod local;

@@ -6,6 +6,7 @@ use crate::clock::Instant;
 
 use super::history::{History, PAIRS, Pair};
 use super::input::{Input, Report, SolverContext};
+use super::line_search::{LineSearch, Tried};
 use super::local::{Linearisation, LocalSolver};
 use super::memory::Memory;
 use super::motion::Motion;
@@ -19,11 +20,6 @@ use crate::memory::{self, HeldBytes};
 
 /// A state whose smallest det F falls below this is not accepted.
 pub const SMALLEST_DET: f32 = 0.02;
-/// A step is accepted where the mean of its end slopes is below this part of the first: a test by gradients, because in f32 the
-/// rounding of the energy drowns its change.
-pub(super) const SLOPE: f64 = 1e-4;
-/// Shortenings of one step at most.
-pub(super) const SHORTENINGS: u32 = 6;
 /// A load whose guess halves the smallest det F is taken in at most this many parts.
 pub(super) const MOST_PARTS: u32 = 16;
 
@@ -367,30 +363,26 @@ impl ImplicitSolver {
         let mut slope = [0.0];
         dots(env.isa, env.pool, &[g], d, &mut self.partial, &mut slope)?;
         let [slope] = slope;
-        let mut t = 1.0f32;
-        let mut accepted = det;
-        for attempt in 0..=SHORTENINGS {
+        let mut search = LineSearch::new(slope);
+        loop {
+            let t = search.t;
             passes::shorten(env, u, d, t, q)?;
             let (det_new, slope_new) = self.residual(context, [last, q, d], g_new, report)?;
-            if det_new > SMALLEST_DET && 0.5 * (slope + slope_new) <= SLOPE * slope {
-                self.stand();
-                u.copy_from_slice(q);
-                passes::difference(env, g_new, g, q)?;
-                self.memory.store(env, d, t, q)?;
-                g.copy_from_slice(g_new);
-                accepted = det_new;
-                break;
+            match search.judge(det_new > SMALLEST_DET, slope_new) {
+                Tried::Accepted => {
+                    self.stand();
+                    u.copy_from_slice(q);
+                    passes::difference(env, g_new, g, q)?;
+                    self.memory.store(env, d, t, q)?;
+                    g.copy_from_slice(g_new);
+                    return Ok(det_new);
+                }
+                Tried::Shortened => {}
+                Tried::GivenUp => {
+                    self.memory.clear();
+                    return Ok(det);
+                }
             }
-            if attempt == SHORTENINGS || slope >= 0.0 {
-                self.memory.clear();
-                break;
-            }
-            t *= if det_new > SMALLEST_DET && slope_new.is_finite() {
-                (-slope / (slope_new - slope)).clamp(0.1, 0.5) as f32
-            } else {
-                0.5
-            };
         }
-        Ok(accepted)
     }
 }

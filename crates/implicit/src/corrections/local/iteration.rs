@@ -7,8 +7,9 @@ use super::linear::WHAT;
 use super::step::{add, dot, resize};
 use super::{Gain, LocalSolver, StepContext, each_load};
 use crate::contact::{Compliance, ContactProblem, State};
+use crate::corrections::line_search::{LineSearch, Tried};
 use crate::corrections::precondition::{DIAGONAL_WEIGHT, Env};
-use crate::corrections::solver::{SHORTENINGS, SLOPE, SMALLEST_DET};
+use crate::corrections::solver::SMALLEST_DET;
 use crate::corrections::tool_contact::SUNK_MM;
 use crate::error::Result;
 use crate::memory;
@@ -33,8 +34,9 @@ impl LocalSolver {
         self.measure_direction(env);
         let work = self.work(problem);
         let slope = self.residual.over(&self.d) - work;
-        let (mut t, mut gain) = (1.0f32, Gain::default());
-        for attempt in 0..=SHORTENINGS {
+        let mut search = LineSearch::new(slope);
+        loop {
+            let t = search.t;
             self.place_at(base, t);
             let det = self.evaluate(step, t)?;
             let slope_new = self.next.over(&self.d) - work;
@@ -47,32 +49,28 @@ impl LocalSolver {
                 self.place_at(base, 0.0);
                 sunk_mm <= sunk(problem, &self.trial)
             };
-            if is_kept && 0.5 * (slope + slope_new) <= SLOPE * slope {
-                self.accept(step, t)?;
-                self.det = det;
-                gain = Gain {
-                    is_better: true,
-                    sunk_mm,
-                };
-                if t < 1.0 {
-                    problem.blend(t);
+            match search.judge(is_kept, slope_new) {
+                Tried::Accepted => {
+                    self.accept(step, t)?;
+                    self.det = det;
+                    if t < 1.0 {
+                        problem.blend(t);
+                    }
+                    return Ok(Gain {
+                        is_better: true,
+                        sunk_mm,
+                    });
                 }
-                break;
+                Tried::Shortened => {}
+                Tried::GivenUp => {
+                    self.place_at(base, 0.0);
+                    problem.undo();
+                    self.pairs.clear();
+                    self.factor.clear();
+                    return Ok(Gain::default());
+                }
             }
-            if attempt == SHORTENINGS || slope >= 0.0 {
-                self.place_at(base, 0.0);
-                problem.undo();
-                self.pairs.clear();
-                self.factor.clear();
-                break;
-            }
-            t *= if is_kept && slope_new.is_finite() {
-                (-slope / (slope_new - slope)).clamp(0.1, 0.5) as f32
-            } else {
-                0.5
-            };
         }
-        Ok(gain)
     }
 
     /// The direction of L-BFGS, without what the contact makes of it.
