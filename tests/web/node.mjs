@@ -9,6 +9,7 @@ import { press } from "./press.mjs";
 const [root, wasm, native] = process.argv.slice(2);
 const { load, UptError } = await import(join(root, "web/src/index.js"));
 const { Clock, between } = await import(join(root, "web/src/clock.js"));
+const { Surgery } = await import(join(root, "web/src/surgery.js"));
 const compiled = await WebAssembly.compile(readFileSync(wasm));
 
 /** Name and bytes of a bundle's files. */
@@ -18,6 +19,21 @@ function bundle(name) {
 }
 const start = (isa) => load({ wasm: compiled, isa });
 const LIVER = "onnx/liver-coarse";
+
+/** Each edge of a closed surface is passed as often in one direction as in the other. */
+function closed(triangles) {
+  const edges = new Map();
+  for (let i = 0; i < triangles.length; i += 3) {
+    const corners = triangles.subarray(i, i + 3);
+    if (corners[0] === corners[1]) continue;
+    corners.forEach((from, k) => {
+      const to = corners[(k + 1) % 3];
+      const key = `${Math.min(from, to)} ${Math.max(from, to)}`;
+      edges.set(key, (edges.get(key) ?? 0) + Math.sign(to - from));
+    });
+  }
+  return [...edges.values()].every((sum) => sum === 0);
+}
 
 function refused(status, words) {
   return (error) => {
@@ -130,6 +146,72 @@ const tests = {
     scene.readPoints().forEach((moved, axis) => assert.ok(Math.abs(moved - all[node + axis]) < 1e-4));
     assert.equal(scene.present(0.01, tool, { points: true }).length, 3);
     assert.ok(scene.stats().step_count === 1 && scene.readings()[0].contact_count > 0);
+  },
+
+  async a_blade_cuts_and_what_is_new_of_the_surface_is_told() {
+    const upt = await start();
+    const model = await upt.open(bundle(LIVER));
+    const scene = model.scene();
+    const nodes = scene.nodeCount;
+    const whole = scene.updateSurface();
+    assert.ok(whole.isNew && whole.firstVertex === 0 && closed(whole.triangles));
+    const [x, y, z] = model.positions().slice(3 * model.indices("domainNodes")[0]);
+    const edge = (ahead) => [[x + ahead, y, z + 15], [x + ahead, y, z - 15]];
+    const before = scene.save();
+    let area = 0;
+    for (let at = -15; at < 15; at += 3) {
+      const cut = scene.cut([edge(at), edge(at + 3)], { fractureEnergy: 10 });
+      area += cut.area_mm2;
+      if (cut.is_changed) assert.ok(closed(scene.updateSurface().triangles));
+    }
+    const { rest, inside, isNew } = scene.updateSurface();
+    assert.ok(area > 50 && !isNew && inside.some((one) => one === 1), `${area} mm2`);
+    assert.equal(scene.step([{ position: [500, 0, 0], radius: 5 }]).length, 3 * scene.nodeCount);
+    assert.ok(scene.nodeCount > nodes && scene.present(0.01, [], { surface: true }).length === rest.length);
+    assert.throws(() => scene.cut([edge(0), edge(0)]), refused("UPT_ERR_ARGUMENT", /sweeps no area/));
+    const taken = scene.remove({ shape: "sphere", position: [x, y, z], radius: 5 }, 30);
+    assert.ok(Math.abs(taken.removed_mm3 - 30) < 3 && scene.updateSurface().changed.length > 0);
+    assert.equal(scene.scaleStiffness([0, 1, 2], 4).is_changed, 1);
+    scene.restore(before);
+    assert.equal(scene.nodeCount, nodes);
+    assert.deepEqual(scene.updateSurface().triangles, whole.triangles);
+    assert.equal(scene.read().length, 3 * nodes);
+  },
+
+  // What the worker does with a tool that cuts, step by step.
+  async strokes_are_undone_one_by_one() {
+    const upt = await start();
+    const model = await upt.open(bundle(LIVER));
+    const scene = model.scene();
+    scene.setRegion(model.indices("surfaceNodes"));
+    const surgery = new Surgery(scene, model);
+    assert.equal(surgery.news(), undefined);
+    const [x, y, z] = model.positions().slice(3 * model.indices("domainNodes")[0]);
+    const upright = { rotation: [Math.SQRT1_2, 0, 0, Math.SQRT1_2], halfLength: 20, radius: 2 };
+    const step = (...tools) => {
+      surgery.operate(tools, 0.02);
+      scene.step();
+    };
+    for (let at = -10; at <= 10; at += 2) step({ ...upright, kind: "blade", position: [x + at, y, z + 12] });
+    step();
+    const cut = surgery.told();
+    assert.ok(cut.areaMm2 > 50 && cut.undos === 1 && cut.copies > 0, JSON.stringify(cut));
+    const news = surgery.news();
+    assert.ok(news.isNew && news.rest.length === 3 * news.vertices && news.corners.length === 3 * news.changed.length);
+    assert.equal(scene.present(0, [], { surface: true }).length, 3 * news.vertices);
+    for (let at = 0; at < 5; at += 1) step({ ...upright, kind: "aspirator", radius: 5, position: [x, y, z + 20] });
+    step();
+    const less = surgery.told();
+    assert.ok(less.removedMm3 > 20 && less.undos === 2, JSON.stringify(less));
+    step({ ...upright, kind: "coagulator", radius: 8, position: [x, y, z + 20] });
+    assert.ok(surgery.news().hardened.length > 0);
+    const two = { ...upright, kind: "blade", position: [x, y, z] };
+    assert.throws(() => step(two, two), refused("UPT_ERR_ARGUMENT", /two tools that cut/));
+    assert.throws(() => step({ ...two, kind: "saw" }), refused("UPT_ERR_ARGUMENT", /kind is saw; it can be press, blade/));
+    assert.ok(surgery.undo() && surgery.undo() && surgery.told().areaMm2 === cut.areaMm2);
+    assert.equal(surgery.news().hardened.length, 0);
+    assert.ok(surgery.undo() && !surgery.undo());
+    assert.deepEqual([surgery.told().areaMm2, scene.nodeCount], [0, model.info.node_count]);
   },
 
   async memory_grows_and_is_used_again() {

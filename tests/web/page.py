@@ -91,6 +91,29 @@ def a_grasp_pulls(browser: Browser, address: str, name: str) -> None:
     browser.wait("uptView.contacts == 0")
 
 
+def a_cut_is_made_and_undone(browser: Browser, address: str, name: str) -> None:
+    """The blade on the mouse, what it lays open, and the aspirator; each is taken back."""
+    x, y = shown(browser, address, name)
+    browser.click("[data-kind=blade]")
+    browser.drag([(x - 45, y - 10), (x - 44, y - 10)], release=False)
+    browser.move([(x - 44, y - 10)] * 4)
+    browser.move([(x - 44 + 6 * i, y - 10 + i) for i in range(16)])
+    browser.wait("uptView.copies > 0 && uptView.area > 50")
+    browser.release()
+    browser.wait("uptView.undos === 1 && uptView.surfaces > 1")
+    browser.click("[data-kind=aspirator]")
+    browser.run("document.getElementById('radius').value = 9")
+    browser.drag([(x + 10, y - 30), (x + 11, y - 30)], release=False)
+    browser.wait("uptView.removed > 500")
+    browser.screenshot(str(PICTURES / f"{name}-cut.png"))
+    browser.release()
+    browser.wait("uptView.undos === 2")
+    for undos in (1, 0):
+        browser.click("#undo")
+        browser.wait(f"uptView.undos === {undos}")
+    assert browser.run("return uptView.copies + uptView.removed + uptView.area") == 0
+
+
 def little_is_loaded(browser: Browser, address: str) -> None:
     """Less than 4 MB to the first dent, with a module of 0.8 MB (the tested one has more in it) and text compressed."""
     Files.sent = 0
@@ -149,6 +172,23 @@ def the_example_moves(browser: Browser, address: str) -> None:
     place = "geometry.attributes.position.array"
     browser.wait("window.carried && organ.frame.points")
     browser.wait(f"twin.{place}.every((x, i) => Math.abs(x - organ.{place}[i]) < 0.05) && {moved} > 1")
+    # A blade in place of the ball: the mesh has the lips, in the other material.
+    browser.run(
+        "organ.update = async () => {};"
+        "const at = 3 * tissue.domain.indexOf(1);"
+        "const [x, y, z] = tissue.positions.subarray(at, at + 3);"
+        "const blade = { kind: 'blade', rotation: [Math.SQRT1_2, 0, 0, Math.SQRT1_2], halfLength: 20, radius: 2 };"
+        "(async () => {"
+        "  for (let aside = -15; aside <= 15; aside += 1) {"
+        "    organ.show(await tissue.frame([{ ...blade, position: [x + aside, y, z + 12] }]));"
+        "    await new Promise((done) => setTimeout(done, 30));"
+        "  }"
+        "  window.cut = true;"
+        "})()"
+    )
+    browser.wait("window.cut && organ.frame.surgery.areaMm2 > 30 && organ.geometry.groups[1].count > 0")
+    assert browser.run(f"return organ.{place}.length === organ.frame.displacement.length")
+    browser.screenshot(str(PICTURES / "example-cut.png"))
 
 
 def on(browser: Browser, test: Callable, *arguments: str) -> tuple[str, Callable]:
@@ -171,6 +211,7 @@ def main() -> int:
         on(desk, a_drag_presses, address, "liver"),
         on(desk, a_recording_comes_again, address, "liver"),
         on(desk, a_grasp_pulls, address, "liver"),
+        on(desk, a_cut_is_made_and_undone, address, "liver"),
         on(desk, the_example_moves, address),
         on(phone, a_drag_presses, address, "phone"),
     ]

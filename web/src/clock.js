@@ -62,6 +62,7 @@ export function between(from, to, part) {
   if (part >= 1 || from.length !== to.length) return to;
   return to.map((end, i) => {
     const start = from[i];
+    if (start.kind !== end.kind) return end;
     if (start.position.some((x, k) => Math.abs(x - end.position[k]) > PUT_MM)) return end;
     const position = start.position.map((x, k) => x + part * (end.position[k] - x));
     const [p, q] = [start.rotation ?? [0, 0, 0, 1], end.rotation ?? [0, 0, 0, 1]];

@@ -136,14 +136,58 @@ export interface Model {
   close(): void;
 }
 
+/** What an operation did: the fields of `upt_cut`. */
+export interface Cut {
+  /** 1 where the body is another one: its surface wants an update. */
+  is_changed: number;
+  node_count: number;
+  copied_count: number;
+  /** New area, mm². */
+  area_mm2: number;
+  /** What the body has lost, mm³. */
+  removed_mm3: number;
+  fragment_count: number;
+  /** On the blade, mN. */
+  force: [number, number, number];
+}
+
+export interface CutOptions {
+  /** Calls with the same number are one blade that goes on. */
+  stroke?: number;
+  /** Of the edge. */
+  points?: number;
+  /** What new area takes, J/m². */
+  fractureEnergy?: number;
+  /** With how much the blade must be pushed before it cuts, and is, mN. */
+  threshold?: number;
+  pushed?: number;
+  /** Where the edge is sharp; zeros: everywhere. */
+  ahead?: ArrayLike<number>;
+}
+
+/** The closed surface of a body. Vertices and slots of triangles keep their numbers. */
+export interface Surface {
+  isNew: boolean;
+  /** The first vertex that is new. */
+  firstVertex: number;
+  /** [vertices,3], mm. */
+  rest: Float32Array;
+  /** [slots,3]: three zeros where there is none. */
+  triangles: Uint32Array;
+  /** 1 where the triangle was inside of the intact body [slots]. */
+  inside: Uint8Array;
+  /** Slots with other corners than before. */
+  changed: Uint32Array;
+}
+
 /** One tissue that is stepped. Arrays that a call returns are views of the module's memory, good until the next call. */
 export interface Scene {
   /** For the C ABI. */
   readonly handle: number;
   /** Displacements [n,3] of the region after a step with the instruments where they are at its end, mm. */
   step(instruments?: Instrument[], timeSeconds?: number): Float32Array;
-  /** The tissue `when` seconds after the last step, with the instruments there: of the region, or of the attached points. */
-  present(when: number, instruments?: Instrument[], options?: { points?: boolean }): Float32Array;
+  /** The tissue `when` seconds after the last step, with the instruments there: of the region, of the attached points, or of the surface's vertices. */
+  present(when: number, instruments?: Instrument[], options?: { points?: boolean; surface?: boolean }): Float32Array;
   read(): Float32Array;
   /** Of the last step's instruments, in their order. */
   readings(): Reading[];
@@ -154,6 +198,20 @@ export interface Scene {
   /** Points [p,3] at rest, mm. */
   attachPoints(points: ArrayLike<number> & Iterable<number>): void;
   readPoints(): Float32Array;
+  /** Of the body: copies that cuts have made included. */
+  readonly nodeCount: number;
+  /** A blade's edge goes from pose to pose, [n, points, 3] mm, and cuts what it passes. */
+  cut(poses: number[][][], options?: CutOptions): Cut;
+  /** Takes tissue inside of an instrument, up to so many mm³, the deepest first. */
+  remove(instrument: Instrument, mostMm3: number): Cut;
+  /** Multiplies the stiffness of elements of the intact mesh. */
+  scaleStiffness(elements: ArrayLike<number> & Iterable<number>, factor: number): Cut;
+  /** Takes the pieces that nothing holds out of the body. */
+  dropFragments(): Cut;
+  updateSurface(): Surface;
+  /** State and body. */
+  save(): Uint8Array;
+  restore(snapshot: Uint8Array): void;
   reset(): void;
   close(): void;
 }

@@ -126,7 +126,9 @@ class Scene {
   #tools = { at: 0, room: 0, count: 0 };
   #input; // upt_input, then upt_view
   #shown; // nodes of the region
+  #hasRegion = false;
   #points = 0;
+  #vertices = 0; // of the surface as it was last updated
   #closed = false;
 
   constructor(module, model, nodes, options = {}) {
@@ -159,13 +161,14 @@ class Scene {
     return this.#filled(this.#shown, (at, floats) => this.#module.run("upt_scene_step", this.handle, input, at, floats));
   }
 
-  /** The tissue `when` seconds after the last step, with the instruments there; as `step`, or of the attached points. */
-  present(when, instruments = [], { points = false } = {}) {
+  /** The tissue `when` seconds after the last step, with the instruments there; as `step`, or of the attached points, or of the surface's vertices. */
+  present(when, instruments = [], { points = false, surface = false } = {}) {
     const input = this.#write(instruments, 0);
     const view = this.#input + abi.upt_input.size;
-    if (points) this.#module.write(view, abi.upt_view, { kind: abi.UPT_VIEW_POINTS });
-    const count = points ? this.#points : this.#shown;
-    return this.#filled(count, (at, floats) => this.#module.run("upt_scene_present", this.handle, input, when, points ? view : 0, at, floats));
+    const kind = points ? abi.UPT_VIEW_POINTS : surface ? abi.UPT_VIEW_SURFACE : abi.UPT_VIEW_REGION;
+    this.#module.write(view, abi.upt_view, { kind });
+    const count = points ? this.#points : surface ? this.#vertices : this.#shown;
+    return this.#filled(count, (at, floats) => this.#module.run("upt_scene_present", this.handle, input, when, view, at, floats));
   }
 
   /** Displacements of the region in the last state. */
@@ -198,7 +201,84 @@ class Scene {
   /** The nodes that are shown from here on; none means all. */
   setRegion(nodes = []) {
     this.#withList(nodes, (at) => this.#module.run("upt_scene_set_region", this.handle, at, BigInt(nodes.length)));
-    this.#shown = nodes.length || this.#room.floats / 3;
+    this.#hasRegion = nodes.length > 0;
+    this.#shown = nodes.length || this.nodeCount;
+  }
+
+  /** Nodes of the body, copies that cuts have made included. */
+  get nodeCount() {
+    return this.#module.out("upt_scene_read_node_count", this.handle);
+  }
+
+  /**
+   * A blade's edge goes from place to place, `poses` [n, points, 3] mm, and cuts what it passes. Calls with the same `stroke` are one blade that goes on. What it
+   * did: the fields of `upt_cut`.
+   */
+  cut(poses, { stroke = 0, points = 2, fractureEnergy = 0, threshold = 0, pushed = 0, ahead = [0, 0, 0] } = {}) {
+    const list = Float32Array.from(poses.flat(2));
+    const count = BigInt(Math.floor(list.length / (3 * points)));
+    return this.#module.withRoom(abi.upt_blade.size, (blade) => {
+      this.#module.write(blade, abi.upt_blade, { fracture_energy: fractureEnergy, threshold, pushed, ahead });
+      const run = (at, out) => this.#module.run("upt_scene_cut_with", this.handle, blade, stroke, at, count, BigInt(points), out);
+      return this.#withList(list, (at) => this.#operate((out) => run(at, out)));
+    });
+  }
+
+  /** Takes tissue that lies inside of an instrument, up to so many mm³, the deepest first. */
+  remove(instrument, mostMm3) {
+    this.#write([instrument], 0);
+    return this.#operate((out) => this.#module.run("upt_scene_remove", this.handle, this.#tools.at, mostMm3, out));
+  }
+
+  /** Multiplies the stiffness of elements of the intact mesh. */
+  scaleStiffness(elements, factor) {
+    const run = (at, out) => this.#module.run("upt_scene_scale_stiffness", this.handle, at, BigInt(elements.length), factor, out);
+    return this.#withList(elements, (at) => this.#operate((out) => run(at, out)));
+  }
+
+  /** Takes the pieces that nothing holds out of the body. */
+  dropFragments() {
+    return this.#operate((out) => this.#module.run("upt_scene_drop_fragments", this.handle, out));
+  }
+
+  /** The closed surface of the body as it is now, and what of it is new since the last time. */
+  updateSurface() {
+    const module = this.#module;
+    const found = module.filled(abi.upt_surface, "upt_scene_update_surface", this.handle);
+    const [vertices, slots, changed] = [found.vertex_count, found.triangle_count, found.changed_count];
+    const counts = [12 * vertices, 12 * slots, 4 * changed, slots];
+    this.#vertices = vertices;
+    return module.withRoom(counts.reduce((sum, bytes) => sum + bytes), (rest) => {
+      const [triangles, changes] = [rest + counts[0], rest + counts[0] + counts[1]];
+      const inside = changes + counts[2];
+      module.run("upt_scene_read_surface", this.handle, rest, BigInt(vertices), triangles, inside, BigInt(slots), changes, BigInt(changed));
+      return {
+        isNew: found.is_new !== 0,
+        firstVertex: found.first_vertex,
+        rest: module.floats(rest, 3 * vertices).slice(),
+        triangles: module.words(triangles, 3 * slots).slice(),
+        inside: module.bytes(inside, slots).slice(),
+        changed: module.words(changes, changed).slice(),
+      };
+    });
+  }
+
+  /** A snapshot: the state, of the body too. */
+  save() {
+    const count = this.#module.out("upt_scene_save", this.handle, 0, 0n);
+    return this.#module.withRoom(count, (at) => {
+      this.#module.run("upt_scene_save", this.handle, at, BigInt(count), 0);
+      return this.#module.bytes(at, count).slice();
+    });
+  }
+
+  /** Goes back to a snapshot of this scene's, or of another of its bundle and options. */
+  restore(snapshot) {
+    this.#module.withRoom(snapshot.length, (at) => {
+      this.#module.bytes(at, snapshot.length).set(snapshot);
+      this.#module.run("upt_scene_restore", this.handle, at, BigInt(snapshot.length));
+    });
+    if (!this.#hasRegion) this.#shown = this.nodeCount;
   }
 
   /** Points [p,3] at rest, mm, that follow the tissue from here on. */
@@ -216,6 +296,7 @@ class Scene {
   /** Back to rest. */
   reset() {
     this.#module.run("upt_scene_reset", this.handle);
+    if (!this.#hasRegion) this.#shown = this.nodeCount;
   }
 
   /** Frees the scene. */
@@ -225,6 +306,18 @@ class Scene {
     this.#module.free(this.#room.at, 4 * this.#room.floats);
     this.#module.free(this.#tools.at, this.#tools.room);
     this.#module.free(this.#input, abi.upt_input.size + abi.upt_view.size);
+  }
+
+  // Changes the body; without a region, all its nodes are shown.
+  #operate(run) {
+    this.#refuseIfClosed();
+    return this.#module.withRoom(abi.upt_cut.size, (out) => {
+      this.#module.write(out, abi.upt_cut, {});
+      run(out);
+      const made = this.#module.read(out, abi.upt_cut);
+      if (!this.#hasRegion) this.#shown = made.node_count;
+      return made;
+    });
   }
 
   // The library's own refusal, before anything is written to memory that has gone back.

@@ -8,13 +8,16 @@ export class SoftTissue extends Mesh {
   #attached = []; // {mesh, at, count}: a render mesh, and where its vertices begin in the points
   #points = []; // at rest
   #asked = false;
+  #slots = new Uint32Array(0); // triangles of a body that was cut; three equal corners: none
+  #inside = new Uint8Array(0);
 
-  constructor(tissue, material = new MeshStandardMaterial({ color: 0xb5533c, roughness: 0.55 })) {
+  constructor(tissue, material = new MeshStandardMaterial({ color: 0xb5533c, roughness: 0.55 }), inside = new MeshStandardMaterial({ color: 0x7d1f1c, roughness: 0.5 })) {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(tissue.positions.slice(), 3));
     geometry.setIndex(new BufferAttribute(tissue.faces, 1));
     geometry.computeVertexNormals();
-    super(geometry, material);
+    super(geometry, [material, inside]);
+    geometry.addGroup(0, tissue.faces.length, 0);
     this.frustumCulled = false;
     this.#tissue = tissue;
     this.#rest = tissue.positions;
@@ -41,11 +44,40 @@ export class SoftTissue extends Mesh {
   /** Shows a frame. */
   show(frame) {
     this.frame = frame;
+    if (frame.surface) this.#follow(frame.surface);
     const { position } = this.geometry.attributes;
     for (let i = 0; i < frame.displacement.length; i += 1) position.array[i] = this.#rest[i] + frame.displacement[i];
     position.needsUpdate = true;
     this.geometry.computeVertexNormals();
     if (frame.points) for (const one of this.#attached) this.#move(one, frame.points);
+  }
+
+  // The surface of a body that a tool has changed: faces that were there, then those that were inside, with the other material.
+  #follow({ isNew, vertices, slots, firstVertex, rest, changed, corners, inside }) {
+    const longer = (list, length) => {
+      const made = new list.constructor(length);
+      made.set(isNew ? [] : list);
+      return made;
+    };
+    this.#rest = longer(this.#rest, 3 * vertices);
+    this.#rest.set(rest, 3 * firstVertex);
+    this.#slots = longer(this.#slots, 3 * slots);
+    this.#inside = longer(this.#inside, slots);
+    changed.forEach((slot, i) => {
+      this.#slots.set(corners.subarray(3 * i, 3 * i + 3), 3 * slot);
+      this.#inside[slot] = inside[i];
+    });
+    const lists = [[], []];
+    this.#inside.forEach((which, slot) => {
+      const [a, b, c] = this.#slots.subarray(3 * slot, 3 * slot + 3);
+      if (a !== b) lists[which].push(a, b, c);
+    });
+    this.geometry.dispose();
+    this.geometry = new BufferGeometry();
+    this.geometry.setAttribute("position", new BufferAttribute(this.#rest.slice(), 3));
+    this.geometry.setIndex(new BufferAttribute(Uint32Array.from(lists.flat()), 1));
+    this.geometry.addGroup(0, lists[0].length, 0);
+    this.geometry.addGroup(lists[0].length, lists[1].length, 1);
   }
 
   /** A render mesh follows the tissue, whose vertices lie in it or near it. */

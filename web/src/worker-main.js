@@ -1,10 +1,12 @@
 // The worker's side of worker.js: owns the library, keeps step with the clock, answers one question after another.
 import { Clock, between } from "./clock.js";
 import { load } from "./index.js";
+import { Surgery, isCutting } from "./surgery.js";
 
 const LONGEST_RECORDING = 45_000; // steps: a quarter of an hour of 20 ms
 
 let scene;
+let surgery;
 let clock;
 let dt;
 let framed = 0; // when the last frame was made, s
@@ -36,6 +38,7 @@ const answers = {
     dt = options.stepSeconds ?? info.frame_step_s;
     // No correction begins after this share of a step, so that steps keep up with the clock.
     scene = model.scene({ guard: "report", stepSeconds: dt, budgetUs: Math.round(0.3e6 * dt), ...options });
+    surgery = new Surgery(scene, model);
     clock = new Clock(dt);
     const nodes = model.indices("surfaceNodes");
     const all = model.positions();
@@ -59,14 +62,26 @@ const answers = {
       shown = between(at(Math.max(replayed - 1, 0)), at(replayed), clock.part(framed));
     }
     clock.start(framed);
-    const displacement = scene.present(clock.since(framed), shown).slice();
-    const points = attached ? scene.present(clock.since(framed), shown, { points: true }).slice() : undefined;
+    const pressing = shown.filter((tool) => !isCutting(tool));
+    const surface = surgery.news();
+    const displacement = scene.present(clock.since(framed), pressing, { surface: surgery.begun }).slice();
+    const points = attached ? scene.present(clock.since(framed), pressing, { points: true }).slice() : undefined;
     const frameMs = performance.now() - begun;
     // Steps lie between poses that the library has taken: one that it refused would be in the way of those to come.
     clock.moved(framed, shown);
     clearTimeout(timer);
     timer = setTimeout(stepOn);
-    return { displacement, points, instruments: shown, frameMs, recording: recording !== undefined, replaying: replayed !== undefined, ...last };
+    return {
+      displacement,
+      points,
+      surface,
+      surgery: surgery.told(),
+      instruments: shown,
+      frameMs,
+      recording: recording !== undefined,
+      replaying: replayed !== undefined,
+      ...last,
+    };
   },
 
   attach(points) {
@@ -74,7 +89,12 @@ const answers = {
     attached = points.length > 0;
   },
 
+  undo() {
+    return surgery.undo();
+  },
+
   reset() {
+    surgery.reset();
     scene.reset();
     clock = new Clock(dt);
     replayed = undefined;
@@ -107,7 +127,8 @@ function stepOn() {
   }
   if (recording && recording.length < LONGEST_RECORDING) recording.push(instruments);
   try {
-    scene.step(instruments);
+    surgery.operate(instruments, dt);
+    scene.step(instruments.filter((tool) => !isCutting(tool)));
     last = measured(scene.readings());
   } catch (error) {
     failed = error;

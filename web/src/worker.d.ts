@@ -11,13 +11,55 @@ export interface TissueOptions {
   worker?: Worker;
 }
 
+/** What a tool does: it touches the tissue, or changes the body at each step. The blade's edge is 20 mm from the tool's tip up; the others reach the ball at it. */
+export interface Tool extends Instrument {
+  kind?: "press" | "blade" | "aspirator" | "coagulator";
+}
+
+/** What is new of the surface. Vertices and slots of triangles keep their numbers. */
+export interface SurfaceNews {
+  /** All of it. */
+  isNew: boolean;
+  vertices: number;
+  slots: number;
+  firstVertex: number;
+  /** At rest, of the vertices from `firstVertex` on [.,3], mm. */
+  rest: Float32Array;
+  /** Slots with other corners, and these [.,3]: three zeros where there is no triangle. */
+  changed: Uint32Array;
+  corners: Uint32Array;
+  /** 1 for each changed slot whose triangle was inside of the intact body. */
+  inside: Uint32Array;
+  /** Vertices that were coagulated. */
+  hardened: Uint32Array;
+}
+
+/** What strokes have done so far. */
+export interface SurgeryState {
+  areaMm2: number;
+  removedMm3: number;
+  /** Nodes that cuts have added. */
+  copies: number;
+  /** Strokes that can be undone. */
+  undos: number;
+  /** On the blade, mN. */
+  force: number[];
+  /** That the last change of the body took. */
+  changeMs: number;
+  /** Why the last operation was refused. */
+  refused?: string;
+}
+
 export interface Frame {
-  /** Of the surface's nodes [n,3], mm. */
+  /** Of the surface's nodes [n,3], mm; from the first stroke of a tool that cuts on, of the vertices of `surface`. */
   displacement: Float32Array;
   /** Of the attached points [p,3], mm. */
   points?: Float32Array;
+  /** What has changed of the surface since the last frame. */
+  surface?: SurfaceNews;
+  surgery: SurgeryState;
   /** Where they are in this frame. */
-  instruments: Instrument[];
+  instruments: Tool[];
   /** Of the last step. */
   readings: Reading[];
   stats: Stats;
@@ -42,9 +84,11 @@ export class Tissue {
   readonly domain: Uint32Array;
   readonly stepSeconds: number;
   /** The tissue of this moment. Ask for one for each picture; without frames there are no steps. */
-  frame(instruments?: Instrument[]): Promise<Frame>;
+  frame(instruments?: Tool[]): Promise<Frame>;
   /** Points [p,3] at rest, mm, whose displacements each frame has from here on. */
   attach(points: Iterable<number>): Promise<void>;
+  /** The body before the last stroke; false where there is none. */
+  undo(): Promise<boolean>;
   reset(): Promise<void>;
   /** Keeps the instruments of each step; false: no longer. */
   record(on: boolean): Promise<void>;

@@ -34,7 +34,7 @@ export class Tissue {
 
   /**
    * The tissue of this moment, with the instruments where they are now. Steps are made between frames, at the clock's pace, with the
-   * instruments where they were at each step's moment.
+   * instruments where they were at each step's moment. One whose `kind` is "blade", "aspirator" or "coagulator" changes the body in place of touching it.
    */
   frame(instruments = []) {
     return this.#ask("frame", instruments);
@@ -45,7 +45,12 @@ export class Tissue {
     return this.#ask("attach", Float32Array.from(points));
   }
 
-  /** Back to rest. */
+  /** The body before the last stroke of a blade, aspirator or coagulator; false where there is none. */
+  undo() {
+    return this.#ask("undo");
+  }
+
+  /** Back to rest, and the intact body. */
   reset() {
     return this.#ask("reset");
   }
