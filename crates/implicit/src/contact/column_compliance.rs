@@ -76,6 +76,7 @@ impl ColumnCompliance {
         self.wanted.sort_unstable();
         self.wanted.dedup();
         let known = |column: &u32| self.columns.binary_search(column).is_ok();
+        // A contact with many columns is broad: there the tissue at rest is near enough, and each column costs solves.
         let few = |_: &&dyn Tangent| self.wanted.len() <= MOST_DEFORMED;
         let tangent = compliance.tangent.filter(few);
         let generation = tangent.map_or(0, |tangent| tangent.generation());
@@ -83,6 +84,7 @@ impl ColumnCompliance {
             self.is_static == compliance.inertia.is_none() && self.generation == generation;
         if same_kind
             && !self.columns.is_empty()
+            // Columns that nobody wants any more go once they are half of all.
             && self.columns.len() <= 2 * self.wanted.len()
             && self.wanted.iter().all(known)
         {
@@ -95,6 +97,7 @@ impl ColumnCompliance {
         self.generation = generation;
         std::mem::swap(&mut self.columns, &mut self.wanted);
         std::mem::swap(&mut self.a, &mut self.a_before);
+        // `wanted` and `a_before` hold the call before while `a` is made.
         let made = self.make(compliance, tangent);
         if made.is_err() {
             self.columns.clear();
@@ -122,6 +125,7 @@ impl ColumnCompliance {
         let places = self.places_before.iter();
         self.is_known.extend(places.map(|place| *place != NONE));
         if let Some(tangent) = tangent {
+            // The response keeps its own columns; here all of them are read from it.
             self.is_known.fill(false);
             self.upper.clear();
             memory::fit(&mut self.upper, order * order, WHAT)?;

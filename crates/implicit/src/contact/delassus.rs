@@ -81,6 +81,7 @@ impl Delassus {
         }
         let samples = rows.iter().map(|row| all.at(*row));
         let is_other = self.at.gather(compliance, rows.len(), samples.clone());
+        // Blocks of another tissue or length of step are of no use, nor are those of a call that failed half way.
         if !matches!(is_other, Ok(false)) {
             self.of.clear();
             self.w.clear();
@@ -90,6 +91,7 @@ impl Delassus {
             return Ok(false);
         }
         let count = rows.len();
+        // What both calls have is copied from the one before.
         std::mem::swap(&mut self.w, &mut self.w_before);
         std::mem::swap(&mut self.of, &mut self.of_before);
         self.of.clear();
@@ -153,6 +155,7 @@ impl Delassus {
             } else {
                 self.add_block(i, j, &mut block);
             }
+            // A diagonal block is symmetric but for rounding: its lower half decides, as in the mirrored blocks.
             if i == j {
                 block[0] = [block[0][0], block[1][0], block[2][0]];
                 block[1][2] = block[2][1];

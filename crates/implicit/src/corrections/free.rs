@@ -23,6 +23,7 @@ impl ImplicitSolver {
         let mut report = Report::default();
         let rests = |field: &[f32]| field.iter().all(|value| *value == 0.0);
         let pushes = self.relaxing.as_ref().is_some_and(|own| !own.rests());
+        // A body at rest that nothing pushes stays there, and costs nothing.
         let is_free = input.load.is_none() && !pushes;
         if is_free && rests(input.last) && rests(input.before) && (input.still || self.rests()) {
             next.fill(0.0);
@@ -35,6 +36,7 @@ impl ImplicitSolver {
         self.nodes.clear();
         self.preconditioner.prescribe(context.env(), &[])?;
         self.expect(context, input)?;
+        // Nothing is prescribed: the pairs of the whole body hold.
         self.memory.mask(&[]);
         self.prepare(context, input)?;
         let mut u = std::mem::take(&mut self.u);
@@ -81,6 +83,7 @@ impl ImplicitSolver {
         );
         self.free.ready(context)?;
         let still = input.last;
+        // Internal forces of the last state: what the modes swing about is not linear elasticity but the law.
         let (det, _) = self.residual(context, [still, still, still], g, report)?;
         self.measure(context, input, g)?;
         let env = context.env();
@@ -99,9 +102,11 @@ impl ImplicitSolver {
         self.free.give(|mode| mode.after(h).0 - mode.place);
         self.preconditioner
             .of_natural(env, &self.free.values, &mut self.d)?;
+        // The guess: the last state moved along the modes as their oscillators do.
         passes::shorten(env, input.last, &self.d, 1.0, u)?;
         self.add_gravity(context, input, u)?;
         self.lift(context, input, Some(input.last), u)?;
+        // A guess that inverts elements where the last state did not is given up for the last state.
         let lost = det.is_nan() || det < SMALLEST_DET;
         let mut det = self.residual(context, [input.last, u, u], g, report)?.0;
         if !lost && (det.is_nan() || det < SMALLEST_DET) {
@@ -176,6 +181,7 @@ impl ImplicitSolver {
         self.free.take(|mode| &mut mode.place);
         weighted(self, input.before, 1.0)?;
         self.free.take(|mode| &mut mode.before);
+        // Out of the solver for the call alone; put back before anything can fail.
         let velocity = std::mem::take(&mut self.motion.velocity);
         let measured = weighted(self, &velocity, known);
         self.motion.velocity = velocity;

@@ -16,6 +16,7 @@ pub(super) const SLOTS: usize = 2 * PAIRS;
 /// The pairs, oldest first by `order`.
 #[derive(HeldBytes)]
 pub struct Memory {
+    /// `s` `[K,3]`, mm, and `y`, µN, by slot.
     steps: Vec<Vec<f32>>,
     changes: Vec<Vec<f32>>,
     /// Slots from the oldest to the newest.
@@ -26,6 +27,7 @@ pub struct Memory {
     products: Vec<[f64; SLOTS]>,
     /// The same without the masked nodes.
     masked: Vec<[f64; SLOTS]>,
+    /// Sums of the pieces of a product of vectors.
     partial: PartialSums,
 }
 
@@ -81,6 +83,7 @@ impl Memory {
 
     /// Leaves the nodes out of every product until the next call.
     pub fn mask(&mut self, nodes: &[u32]) {
+        // The products are over all nodes, so that another contact only has to take its own rows off.
         self.masked.copy_from_slice(&self.products);
         for (at, &i) in self.order.iter().enumerate() {
             for &j in &self.order[at..] {
@@ -131,6 +134,7 @@ impl Memory {
             self.products[i][slot] = value;
             self.masked[i][slot] = value;
         }
+        // Without curvature the pair would make `H` indefinite, and the direction lead up.
         if self.products[slot][slot] <= 0.0 {
             self.order.retain(|&other| other != slot);
         }
@@ -142,6 +146,7 @@ impl Memory {
         let mut used = [0usize; PAIRS];
         let mut count = 0;
         for &slot in &self.order {
+            // A pair whose step was at the masked nodes alone says nothing of the others; what rounding leaves of it would be divided by.
             if self.masked[slot][slot] > 1e-12 * self.products[slot][slot] {
                 used[count] = slot;
                 count += 1;
@@ -163,6 +168,7 @@ impl Memory {
         let (used, count) = self.used();
         let used = &used[..count];
         let views = views(&self.steps, used);
+        // All products with `g` come first, in one pass over memory; the recursion over the pairs then is on numbers alone.
         let mut first = [0.0f64; PAIRS];
         let first = &mut first[..count];
         dots(isa, pool, &views[..count], g, &mut self.partial, first)?;
@@ -171,12 +177,14 @@ impl Memory {
         let views = self::views(&self.changes, used);
         let factors = alpha.map(|a| -a as f32);
         add_scaled(isa, pool, &views[..count], &factors[..count], q)?;
+        // `q` is what the pairs leave of the residual: it goes through the preconditioner as through an initial matrix.
         precondition(q, d)?;
         dots(isa, pool, &views[..count], d, &mut self.partial, first)?;
         let weight = weight(&self.masked, used, &alpha, first);
         let views = self::views(&self.steps, used);
         let factors = weight.map(|w| w as f32);
         add_scaled(isa, pool, &views[..count], &factors[..count], d)?;
+        // Down: the recursion gives `H g`.
         d.iter_mut().for_each(|d| *d = -*d);
         Ok(())
     }

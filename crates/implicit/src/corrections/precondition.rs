@@ -48,16 +48,20 @@ pub struct Env<'a> {
 /// The preconditioner for one set of prescribed nodes, and its buffers.
 #[derive(HeldBytes)]
 pub struct Preconditioner {
+    /// What inertia takes off the static compliance, by natural mode: `(1/w² - 1/(w² + kappa)) / m`, mm/mN.
     inertial_compliance: Vec<f32>,
     /// `1 / (m (w² + kappa))` of each natural mode, mm/µN.
     moved_freely: Vec<f32>,
+    /// Where each block of the basis begins in the coordinates.
     pub(super) starts: Vec<usize>,
+    /// All nodes, as rows of the basis.
     plan: RowPlan,
     /// Nodes of the domain, which tools touch.
     domain: RowPlan,
     pub(super) domain_nodes: Vec<u32>,
     /// Contact dofs with columns, as rows of the prior's tables.
     dofs: Vec<u32>,
+    /// Their columns, one for three of those.
     columns: Vec<u32>,
     /// Prescribed nodes, ascending.
     nodes: Vec<u32>,
@@ -68,26 +72,32 @@ pub struct Preconditioner {
     /// A row of what inertia takes off the compliance, and the natural modes at the contact by mode `[n,3m]`.
     lost: Vec<f32>,
     natural: Vec<f32>,
+    /// Factor of `Psi^T (K + kappa M) Psi` with the contact held, and `Phi^T (K + kappa M) Phi` without contact `[r,r]`.
     galerkin: ContactFactor,
     galerkin_free: Vec<f64>,
-    /// That in f32 and its inverse, and forces on columns as two lists.
+    /// The latter in f32, for products, and its inverse: local iterations solve it many times and hold no contact in it.
     galerkin_narrow: Vec<f32>,
     galerkin_inverse: Vec<f32>,
-    load_dofs: Vec<u32>,
     /// Rows of the tables that degrees of freedom have.
     stored: Vec<u32>,
-    load_forces: Vec<f32>,
+    /// Scratch of what the compliance is gathered with.
     widened: Vec<f32>,
+    widened: Vec<f32>,
+    /// `U^T r` on the way down, `U^T z` on the way up `[Q]`: every product with a field goes through here.
     pub(super) coordinates: Vec<f32>,
+    /// `Phi^T r` and what the coarse level makes of it, in amplitudes of the modes `[r]`.
     on_modes: Vec<f32>,
     solved: Vec<f32>,
+    /// Displacements at the prescribed degrees of freedom, mm, and the forces that belong to them, mN.
     at_contact: Vec<f32>,
     forces: Vec<f32>,
     /// Made at the first step with a load.
     whole: Option<Box<WholeSolve>>,
+    /// Whether the step has loads: then the whole modes are part of the coarse level.
     has_load: bool,
     /// The support groups that were let go when it was made.
     let_go: u64,
+    /// The factors are of `nodes`.
     ready: bool,
 }
 
@@ -131,9 +141,7 @@ impl Preconditioner {
             },
             galerkin_free,
             galerkin_inverse: env.space.galerkin_inverse(kappa, env.isa)?,
-            load_dofs: memory::room(dofs, WHAT)?,
             stored: Vec::new(),
-            load_forces: memory::room(dofs, WHAT)?,
             widened: memory::zeros(6 * env.prior.widest_block(), WHAT)?,
             coordinates: memory::zeros(env.prior.width(), WHAT)?,
             on_modes: memory::zeros(count, WHAT)?,
@@ -234,6 +242,7 @@ impl Preconditioner {
     pub fn apply(&mut self, env: Env<'_>, r: &[f32], z: &mut [f32]) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
         let basis = env.prior.basis();
+        // Down to coordinates once, the coarse level there, and up once; the diagonal level is added to the field.
         project_field(isa, pool, &basis, &self.starts, r, &mut self.coordinates)?;
         let whole = self.whole_modes(env);
         self.coarse(env, whole.map(|modes| (modes, r)))?;

@@ -31,6 +31,7 @@ impl ImplicitSolver {
         self.prepare(context, input)?;
         let mut report = Report::default();
 
+        // The fields are out of the solver while its methods run, and come back whatever they give.
         let mut u = std::mem::take(&mut self.u);
         let mut g = std::mem::take(&mut self.g);
         let result = self
@@ -38,6 +39,7 @@ impl ImplicitSolver {
             .and_then(|()| self.finish(context, input, &u));
         if result.is_ok() {
             next.copy_from_slice(&u);
+            // What fell back has followed no equation of motion, so it leaves no velocity behind.
             if report.fell_back {
                 self.stop_next();
                 self.leave_load()?;
@@ -45,6 +47,7 @@ impl ImplicitSolver {
             self.next.min_det = report.min_det;
             self.estimate(&mut report);
         }
+        // Forces are those of the state that stands, of which `g` is the residual.
         let result = result.and_then(|()| self.take_reaction(context, input.contact, &g));
         (self.u, self.g) = (u, g);
         result.map(|()| report)
@@ -69,12 +72,14 @@ impl ImplicitSolver {
             [0, 1, 2].map(|k| input.last[at + k] + part * (c[k] - input.last[at + k]))
         };
         self.preconditioner.respond(env, target, &mut self.d, u)?;
+        // The response has them there but for rounding; exactly there is what the host prescribed.
         for index in 0..self.nodes.len() {
             let at = 3 * self.nodes[index] as usize;
             u[at..at + 3].copy_from_slice(&target(index));
         }
         env.held.put(u);
         let (det, _) = self.residual(context, [input.last, u, u], g, report)?;
+        // Forces are known of this state even if no iteration comes.
         self.stand();
         Ok(det)
     }
@@ -138,6 +143,7 @@ impl ImplicitSolver {
                 self.add_gravity(context, input, u)?;
                 self.lift(context, input, Some(input.last), u)?;
             }
+            // Halved until the first part is gentle: what the iterations start from must not be inverted.
             let part = 1.0 / parts as f32;
             let det = self.lead(context, input, part, u, g, report)?;
             if det > least || parts == MOST_PARTS {
@@ -147,6 +153,7 @@ impl ImplicitSolver {
         };
         for part in 2..=parts {
             if det > SMALLEST_DET {
+                // One iteration between two parts: the next is linear about a state in balance, not about another guess.
                 self.improve(context, input.last, u, g, det, report)?;
             }
             det = self.lead(context, input, part as f32 / parts as f32, u, g, report)?;

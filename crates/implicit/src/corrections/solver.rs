@@ -26,19 +26,28 @@ pub(super) const MOST_PARTS: u32 = 16;
 /// A scene's own part.
 #[derive(HeldBytes)]
 pub struct ImplicitSolver {
+    /// `P`, for the prescribed nodes of the step and the length of its steps.
     pub(super) preconditioner: Preconditioner,
+    /// The pairs of L-BFGS over the whole field: of prescribed contact and free steps.
     pub(super) memory: Memory,
+    /// Room of the elements, and the smallest det F of each chunk at the last evaluation.
     pub(super) scratch: elements::Scratch,
     /// Past of the last published state, and of the one being made.
     pub motion: Motion,
+    /// What [`ImplicitSolver::finish`] has made of the state being made; becomes `motion` in [`ImplicitSolver::commit`], and only there.
     pub(super) next: Motion,
+    /// Nodes in contact whose place is prescribed and that nothing holds, ascending; none where tools drive.
     pub(super) nodes: Vec<u32>,
     /// `r` at `nodes`, of the last evaluation and of the state that stands.
     pub(super) at_nodes: [Vec<f32>; 2],
+    /// The residual `F(u)` of the state that stands, and of the one tried `[K,3]`, µN. Zero at held and prescribed nodes.
     pub(super) g: Vec<f32>,
     pub(super) g_new: Vec<f32>,
+    /// The direction, mm; a field of scratch while there is none.
     pub(super) d: Vec<f32>,
+    /// Scratch `[K,3]`: the state tried, then the change of the residual.
     pub(super) q: Vec<f32>,
+    /// The state being made, mm: the host's field changes only when it is done.
     pub(super) u: Vec<f32>,
     /// The first guess of a step that tools drive.
     pub(super) guess: Vec<f32>,
@@ -46,11 +55,13 @@ pub struct ImplicitSolver {
     pub(super) drift: Vec<f32>,
     /// Loads beside contact at the end of the step `[K,3]`, µN; empty where there are none.
     pub(super) load: Vec<f32>,
+    /// Sums of the pieces of a field, added in their order whatever the threads did: the same bits for any number of them.
     pub(super) partial: PartialSums,
     /// Where the tissue would be, at the nodes of the domain.
     pub(super) touched: Vec<f32>,
     /// Made at the first step that tools drive.
     pub(super) local: Option<Box<LocalSolver>>,
+    /// The natural modes of a free step, in closed form.
     pub(super) free: Oscillators,
     /// The support groups that are let go in the step being made, and in the last published state, of which the pairs are.
     pub(super) let_go: u64,
@@ -275,6 +286,7 @@ impl ImplicitSolver {
 
     /// The state of the last evaluation is the one that stands.
     pub(super) fn stand(&mut self) {
+        // Only a state that was accepted has forces: one that the line search tried and left must not be felt.
         let [last, stands] = &mut self.at_nodes;
         std::mem::swap(last, stands);
     }
@@ -294,6 +306,7 @@ impl ImplicitSolver {
         for iteration in 0..input.enough.iterations {
             let size = self.size(env, g)?;
             let until = input.enough.until;
+            // A budget never takes the first iteration: a guess without one may be anywhere.
             let late = until.is_some_and(|until| Instant::now() >= until);
             if !size.is_finite() || det < SMALLEST_DET || (iteration > 0 && late) {
                 break;
@@ -308,6 +321,7 @@ impl ImplicitSolver {
         let end = self.size(env, g)?;
         if !end.is_finite() || det < SMALLEST_DET {
             u.fill(0.0);
+            // Linear elasticity from rest takes the place of a state that inverts elements, and its pairs would lead back there.
             det = self.lead(context, input, 1.0, u, g, report)?;
             report.fell_back = true;
             self.memory.clear();

@@ -20,6 +20,7 @@ const ONCE_LOST: u32 = 2;
 pub struct Substeps {
     /// A step is made of substeps where it leaves out more than this, mm, before the bundle's calibration.
     limit_mm: f32,
+    /// Responses of the contact at the substeps' length, kept apart from those of whole steps: both stay known.
     responses: Delassus,
     /// Contact at the start of the step, the tools at its end, where they came from, and where they are.
     past: Past,
@@ -81,6 +82,7 @@ impl ImplicitSolver {
         let Some((substeps, substepper)) = substeps else {
             return self.correct_loaded(context, input, problem, next);
         };
+        // From an inverted state a step begins at rest, and so would each of its parts.
         let lost = self.motion.min_det < SMALLEST_DET;
         if substeps.helps(self.motion.truncated_mm) && !lost {
             return self.drive_substeps(context, input, problem, (substeps, substepper), next);
@@ -91,6 +93,7 @@ impl ImplicitSolver {
         if whole.fell_back || !helps {
             return Ok(whole);
         }
+        // A tool that the whole step stopped on its way is where the host has put it again.
         problem.aim();
         let parts = self.drive_substeps(context, input, problem, (substeps, substepper), next)?;
         Ok(whole.and(&parts))
@@ -120,6 +123,7 @@ impl ImplicitSolver {
         memory::fit(&mut substeps.tied, substeps.ties.len(), WHAT)?;
         self.exchange(substepper);
         problem.exchange(&mut substeps.responses);
+        // Solver and contact have the shorter steps' diagonal, pasts and responses between these two exchanges, and their own again after them, also where it fails.
         let result = self.each_substep(context, input, problem, (substeps, substepper));
         self.exchange(substepper);
         problem.exchange(&mut substeps.responses);
@@ -154,6 +158,7 @@ impl ImplicitSolver {
         let mut lost = false;
         torn.fill(false);
         broke.fill(false);
+        // Those of another length of step: their curvature has another inertia in it.
         self.clear_pairs();
         for part in 1..=count {
             let way = part as f32 / count as f32;
@@ -174,6 +179,7 @@ impl ImplicitSolver {
                 next,
                 ..
             } = &mut *substepper;
+            // A substep is a step to the contact: it goes on from the forces of the one before.
             problem.enter(on_their_way, tied, input.rest, last)?;
             let short = SolverContext {
                 time_step,
@@ -202,6 +208,7 @@ impl ImplicitSolver {
                 held.reading.broke = *broke;
             }
             std::mem::swap(&mut self.motion, &mut self.next);
+            // The last one is published by the scene, or not.
             if part < count {
                 problem.commit();
             }

@@ -66,6 +66,7 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         self.nodes.clear();
         problem.take_length(context.time_step.integrator.step_s as f32);
+        // Contact is a load here, and nothing is prescribed: the pairs of the whole field hold at every node.
         self.memory.mask(&[]);
         self.expect(context, input)?;
         self.prepare(context, input)?;
@@ -92,6 +93,7 @@ impl ImplicitSolver {
             }
             self.next.min_det = report.min_det;
             self.next.level = report.level as u32;
+            // Known only now: how far the next step reaches decides whether this one's pairs are of use to it.
             self.leave_level();
             self.estimate(&mut report);
         }
@@ -113,12 +115,14 @@ impl ImplicitSolver {
             // No mode of the bundle moves what the group held, and from where it has gone iterations find the rest.
             self.move_whole(context, input, problem, at, report, 0.0)?;
         }
+        // `fall_back` and `recover` come back to it.
         self.guess.copy_from_slice(at.u);
         problem.keep_guess()?;
         let mut size = self.improve_loaded(context, input, problem, at, report)?;
         if !is_sound(size, at.det) {
             size = self.recover(context, input, problem, at, report)?;
         }
+        // A state in balance may still have lost the tool: a thin one has gone through the surface.
         let left = sunk(input, problem, at.u, 1.0);
         if !is_sound(size, at.det) || left > SUNK_MM {
             self.fall_back(context, input, problem, at, report)?;
@@ -168,13 +172,16 @@ impl ImplicitSolver {
         if self.motion.min_det < SMALLEST_DET && !input.still {
             return self.respond_from_rest(context, input, problem, at, report);
         }
+        // Held tissue beside a cut: the linear response of the intact body would tear at what is no longer there.
         if problem.has_grasp() && !context.corrections.changed.is_empty() {
             return self.guess_freely(context, input, problem, at, report);
         }
+        // The guess is made again in twice as many parts, with an iteration after each, until it does not halve the smallest det F.
         let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
         let ways = problem.parts();
         let mut iterated = 1;
         loop {
+            // Each attempt begins with the forces of the last step: they belong to `input.last`.
             problem.restart();
             at.u.copy_from_slice(input.last);
             self.add_gravity(context, input, at.u)?;
@@ -219,6 +226,7 @@ impl ImplicitSolver {
 
     /// The coordinates become `-N diag(1 / (m (w² + kappa))) N^T [I_{n+1}(u_n) - I_n]`: what the natural modes do by themselves.
     pub(super) fn move_freely(&mut self, env: Env<'_>) -> Result<()> {
+        // What BDF2 takes from the past, less the inertia that the last state had: the modes answer to the difference alone.
         passes::difference(env, &self.drift, &self.motion.inertia, &mut self.q)?;
         mask_held(&env.held.is, &mut self.q);
         self.preconditioner.move_natural(env, &self.q)
@@ -269,6 +277,7 @@ impl ImplicitSolver {
             let range = 3 * node as usize..3 * node as usize + 3;
             let base = &u[range.clone()];
             let touched = &mut self.touched[range];
+            // The coordinates' field knows nothing of held nodes.
             match env.held.is[node as usize] {
                 true => touched.copy_from_slice(base),
                 false => touched.iter_mut().zip(base).for_each(|(t, u)| *t += u),

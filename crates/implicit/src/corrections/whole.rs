@@ -86,6 +86,7 @@ impl WholeModes {
         };
         // `dK V` and the masses at the free corners.
         let (mut forces, masses) = lost.on_fields(own, values)?;
+        // Table 0 is the stiffness, table 1 the mass: forces of the lost elements, then their masses times the fields.
         for table in 0..2 {
             for (at, row) in forces.chunks_exact_mut(own).enumerate() {
                 let (node, axis) = (lost.nodes[at / 3], at % 3);
@@ -209,6 +210,7 @@ impl WholeSolve {
         kappa: f64,
     ) -> Result<WholeSolve> {
         let (own, coarse) = (modes.count(), space.count());
+        // `X = G^-1 Phi^T A V`, summed in f64, since `S` below is a difference.
         let inverse = space.galerkin_inverse(kappa, compute.isa)?;
         let joined = |tables: &[Vec<f32>; 2], at: usize| {
             f64::from(tables[0][at]) + kappa * f64::from(tables[1][at])
@@ -262,6 +264,7 @@ impl WholeSolve {
         r: &[f32],
         on_modes: &[f32],
     ) -> Result<()> {
+        // Copies of nodes lie behind the body's own: they have the values of their parents in each mode.
         let (r, copies) = r.split_at(modes.len());
         let mut views = [r; AT_ONCE];
         let mut sums = [0.0; AT_ONCE];
@@ -289,6 +292,7 @@ impl WholeSolve {
                 }
             }
         }
+        // `V' = V - Phi X`: what `V` has of the modes is theirs.
         for (row, on_mode) in self.cross.chunks_exact(self.rows.len()).zip(on_modes) {
             for (work, x) in self.work.iter_mut().zip(row) {
                 *work -= x * on_mode;

@@ -75,6 +75,7 @@ unsafe fn forward_body<V: DenseLanes>(upper: &[f32], width: usize, count: usize,
     for side in (0..count).step_by(V::COUNT) {
         let mut first = 0;
         while first < own {
+            // A panel's values stay in registers while all later rows pass: each is loaded and stored once for eight rows of `U`.
             let rows = PANEL.min(own - first);
             // SAFETY: `V::COUNT` divides the sides; rows and columns lie in the front.
             unsafe {
@@ -120,6 +121,7 @@ unsafe fn back_body<V: DenseLanes>(upper: &[f32], width: usize, count: usize, x:
     for side in (0..count).step_by(V::COUNT) {
         let mut end = own;
         while end > 0 {
+            // From the last panel to the first; in each the later values come first, then the triangle of its own rows.
             let first = end.saturating_sub(PANEL);
             let rows = end - first;
             // SAFETY: as in `forward_body`.

@@ -68,6 +68,7 @@ pub struct SparseFactor {
     gathered: Vec<f32>,
     permuted: Vec<f32>,
     many: ManySides,
+    /// Whether `upper` is of the matrix that was taken last.
     is_made: bool,
 }
 
@@ -284,6 +285,7 @@ impl SparseFactor {
         }
         let (borders, values) = (self.borders.as_slice(), &mut self.gathered);
         for front in &self.fronts {
+            // Right sides of a contact are zero but at a few nodes: whole branches of the dissection are skipped.
             if front.is_zero(&self.permuted) {
                 continue;
             }

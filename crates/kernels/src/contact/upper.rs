@@ -48,6 +48,7 @@ unsafe fn factor_upper_body<V: DenseLanes>(a: &mut [f64], n: usize, positive: &m
             *positive = false;
             return;
         }
+        // The block's rows are final: they are read for all rows below, in tiles that stay in registers.
         let (done, rest) = a.split_at_mut(end * n);
         let block = &done[start * n..];
         let mut i = end;
@@ -86,6 +87,7 @@ fn factor_rows<V: DenseLanes>(a: &mut [f64], n: usize, start: usize, end: usize)
     for k in start..end {
         let (above, below) = a.split_at_mut((k + 1) * n);
         let pivot = above[k * n + k];
+        // `pivot + removed` is the diagonal as it was given: rounding is a part of that.
         let removed: f64 = (0..k).map(|i| above[i * n + k] * above[i * n + k]).sum();
         if !is_sound(pivot, removed) {
             return false;
@@ -141,6 +143,7 @@ fn solve(u: &[f64], x: &mut [f64]) {
     }
     for k in (0..n).rev() {
         let row = &u[k * n..][..n];
+        // Eight sums, so that the compiler makes lanes of them; one after another they would wait for each other.
         let mut sums = [0.0; 8];
         let (us, xs) = (row[k + 1..].chunks_exact(8), x[k + 1..].chunks_exact(8));
         let tail: f64 = us

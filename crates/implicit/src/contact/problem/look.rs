@@ -28,11 +28,13 @@ impl ContactProblem {
     ) -> Result<()> {
         let mut placed: [Option<Placed>; MAX_TOOLS] = [const { None }; MAX_TOOLS];
         for (index, (tool, from)) in self.tools.iter().zip(&self.before).enumerate() {
+            // A tip finer than the spacing of the samples goes in between them: it is looked for as a point.
             if tool.body.sinks_between(SPACING_MM) {
                 let at = pose::between(from, &tool.pose, part);
                 let tip = Buried::tip(&tool.body, &at, &self.samples, state);
                 self.buried[index] = tip.or(self.buried[index]);
             }
+            // At the end of the way samples that the tool has passed are behind it, as far as it came.
             let motion = match wide || part >= 1.0 {
                 true => tool.body.motion(from, &tool.pose),
                 false => 0.0,
@@ -47,6 +49,7 @@ impl ContactProblem {
         self.rows.clear();
         self.found = 0;
         self.shed.clear();
+        // Gap, place and normal follow below, when each sample stands there once.
         let row = |tool: u32, sample: u32, force: Vector, far: bool| Row {
             tool,
             sample,
@@ -83,6 +86,7 @@ impl ContactProblem {
                         .at(found.sample)
                         .gather(|node| state.position_before(node))
                 };
+                // Beyond the skin a sample counts only if the tool's way grazes it.
                 wide || found.distance <= SKIN_MM || pair.may_reach(found.point, start())
             });
             self.rows

@@ -53,6 +53,7 @@ pub struct ContactProblem {
     samples: Arc<Samples>,
     #[held(skip)]
     mesh: Arc<Mesh>,
+    /// Tools of the step being made, by the host's list: the place in it is a tool's identity from step to step.
     tools: Vec<Tool>,
     /// Where each tool was when the step began.
     before: Vec<Pose>,
@@ -72,17 +73,22 @@ pub struct ContactProblem {
     buried: Vec<Option<Buried>>,
     /// Room for rays through the surface.
     sides: Sides,
+    /// Ties of the step, beside the tools.
     tied: TieSet,
     /// At the end of the last published step.
     pub past: Past,
     /// Of the step being made.
     pub next: Past,
+    /// Finds the samples near a tool, with room for what a look finds.
     search: Search,
     sweeps: Sweeps,
+    /// How the rows move under their forces: tissue at rest, at the step's length.
     delassus: Delassus,
     /// The same of deformed tissue.
     tangent: Delassus,
+    /// What a moment between steps has of inertia, another in each frame.
     inertial_compliance: InertialCompliance,
+    /// What the last look found, ascending by tool and sample, then the ties; `contacts` and `forces` are in their order.
     rows: Vec<Row>,
     /// Rows that a solve had no room for: their forces go.
     shed: Vec<Row>,
@@ -107,8 +113,10 @@ pub struct ContactProblem {
     unsolved_mm: f32,
     /// A tool lay in the tissue when the step, or a part of it, began.
     pub lay_in_tissue: bool,
+    /// What the last solve changed, by degrees of freedom of the prior: see [`Change`].
     columns: Vec<u32>,
     change: Vec<f32>,
+    /// The contact as a collision field, for scenes without corrections.
     nodes: Vec<u32>,
     vectors: Vec<f32>,
 }
@@ -218,6 +226,7 @@ impl ContactProblem {
         self.spent = Duration::ZERO;
         self.unsolved_mm = 0.0;
         self.lay_in_tissue = false;
+        // Budgets come after it: how much a step may cost depends on whether a tool may lose its contact.
         self.enter(tools, ties, rest, start)?;
         self.work = Work::of(self.may_lose(), self.tied.work());
         Ok(())
@@ -243,6 +252,7 @@ impl ContactProblem {
         (tools.iter().enumerate()).try_for_each(|(index, tool)| tool.check(index))?;
         self.tools.clear();
         self.tools.extend_from_slice(tools);
+        // From here on `next` has the forces, grasps and ties of the last published step, and a step that fails leaves `past` as it was.
         self.next.take(&self.past)?;
         self.tie(ties)?;
         self.next.tools.truncate(tools.len());
@@ -262,6 +272,7 @@ impl ContactProblem {
         self.buried.clear();
         for (index, tool) in tools.iter().enumerate() {
             let known = self.past.tools.get(index).map(|held| held.pose);
+            // Farther than that no hand goes in a step: it is another place, and there was no way there.
             let moved = known.filter(|from| tool.body.motion(from, &tool.pose) <= PUT_MM);
             let from = moved.unwrap_or(tool.pose);
             self.before.push(from);
@@ -285,6 +296,7 @@ impl ContactProblem {
                 held.grasp.open();
                 held.reading.torn = true;
             }
+            // What is between the jaws when they close stays in them until they open.
             let closes = tool.mode == Mode::Grasp;
             if closes && !held.closed {
                 let position = |node| state.position(node);

@@ -107,6 +107,7 @@ impl ContactProblem {
     ) -> Result<Change<'_>> {
         let start = Instant::now();
         memory::replace(&mut self.kept, &self.next.forces, WHAT)?;
+        // With little work left fewer rows are solved for, and the others wait for the next solve.
         let is_short = self.work.begin_solve();
         let most = if is_short { FEW_ROWS } else { MOST_ROWS };
         self.look(state, part, false, most)?;
@@ -115,6 +116,7 @@ impl ContactProblem {
         self.forces.extend(self.rows.iter().map(|row| row.force));
         self.columns.clear();
         self.columns.extend(self.rows.iter().map(|row| row.sample));
+        // Kept apart, so that the tissue at rest is not read again after each look at the deformed one.
         let own = match compliance.tangent {
             Some(_) => &mut self.tangent,
             None => &mut self.delassus,
@@ -173,6 +175,7 @@ impl ContactProblem {
                 .extend(self.rows.iter().map(|row| moving.measure(row)));
             self.earlier.clear();
             self.earlier.extend_from_slice(&self.forces);
+            // Quick and thin tools need many short linearisations, others a few that may take longer.
             let limits = time.limits();
             let most_work = match self.may_lose.contains(&true) {
                 true => limits.most_work,
@@ -204,8 +207,10 @@ impl ContactProblem {
                 };
                 self.sweeps.shift(at).length() / way
             });
+            // The tool that was trusted least decides for all: forces of one move the samples of another.
             let part = 1.0 / ways.fold(1.0, f32::max);
             for (at, row) in self.rows.iter_mut().enumerate() {
+                // The next linearisation is about where these forces take the samples.
                 row.point += self.sweeps.shift(at) * part;
             }
             if part < 1.0 && extra > 0 && !is_short {
@@ -220,6 +225,7 @@ impl ContactProblem {
         self.columns.clear();
         for (row, force) in self.rows.iter().zip(&self.forces) {
             let sample = all.at(row.sample);
+            // Only what has changed: the state has the forces of before in it already.
             if *force != row.force {
                 self.columns
                     .extend(compliance.entries(sample).map(|entry| entry.0));
@@ -232,6 +238,7 @@ impl ContactProblem {
                 });
             }
         }
+        // Rows without room lose their force, and the tissue must learn of it.
         for row in &self.shed {
             let sample = self.samples.at(row.sample);
             self.columns

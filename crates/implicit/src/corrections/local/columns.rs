@@ -18,7 +18,9 @@ const SYMMETRIC: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 /// What is known of columns, with the factor that it was made by.
 #[derive(Default, HeldBytes)]
 pub(super) struct NearColumns {
+    /// Number of the factor: another one makes all columns anew.
     generation: u64,
+    /// Columns of the prior that are known, in the order of the lists that follow.
     columns: Vec<u32>,
     /// By column and axis: `B e` of a force of 1 mN `[3 C]`, `C` the core, mm; what of the force is left to the modes `[r]`, µN; what they make of it `[r]`, mm.
     moved: Vec<f32>,
@@ -49,6 +51,7 @@ impl Tangent for Response<'_> {
             known.generation = factor.generation;
         }
         known.make(self, factor, room, columns)?;
+        // Entry (i, j) is `e_i . P e_j` by the two levels of the preconditioner: the factor's move in the core, and the work of the force on the modes times their answer.
         let (size, modes) = (3 * self.near.core, self.env.space.count());
         let order = 3 * columns.len();
         let at = |column: u32| known.columns.iter().position(|c| *c == column).unwrap_or(0);
@@ -58,6 +61,7 @@ impl Tangent for Response<'_> {
                 let index = 3 * column + b;
                 let moved = &known.moved[index * size..][..size];
                 let response = &known.modes[index * modes..][..modes];
+                // The upper triangle alone; the matrix is symmetric because `P` is.
                 for (i, &row) in columns[..=j].iter().enumerate() {
                     let node = self.env.prior.contact_nodes[row as usize];
                     let place = self.near.place(node);
@@ -136,6 +140,7 @@ impl NearColumns {
                 moved[(3 * at + axis) * size + 3 * place + axis] = 1e3;
             }
         }
+        // Sixteen right sides go through the factor together: one by one they would read it sixteen times.
         factor.solve_many(env.isa, moved);
         let on_modes = self.on_modes[3 * known * modes..].chunks_exact_mut(3 * modes);
         let responses = self.modes[3 * known * modes..].chunks_exact_mut(3 * modes);
@@ -162,6 +167,7 @@ impl NearColumns {
                 by.preconditioner.respond_on_modes(env, work, response)?;
             }
         }
+        // Last: only whole columns are known.
         self.columns.extend_from_slice(&self.made);
         Ok(())
     }

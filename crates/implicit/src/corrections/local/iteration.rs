@@ -26,12 +26,14 @@ impl LocalSolver {
     ) -> Result<Gain> {
         let _span = tracing::trace_span!("iteration").entered();
         let env = step.context.env();
+        // The direction for the loads that are there; then what the contact changes at its end, as a second answer of the same preconditioner.
         self.descend(step, problem)?;
         self.solve_contact(step, problem, base, way)?;
         let stiff = &mut self.d_stiff;
         step.preconditioner.stiffen(env, &self.d.c, stiff)?;
         self.near.linear(env, &self.d_modes, &mut self.d_linear);
         self.measure_direction(env);
+        // Along a line the loads do not change, so their work is a constant of the slopes.
         let work = self.work(problem);
         let slope = self.residual.over(&self.d) - work;
         let mut search = LineSearch::new(slope);
@@ -39,6 +41,7 @@ impl LocalSolver {
             let t = search.t;
             self.place_at(base, t);
             let det = self.evaluate(step, t)?;
+            // `d` is the direction until `accept` scales it: the slope is that of the line, not of the part.
             let slope_new = self.next.over(&self.d) - work;
             let sunk_mm = match det > SMALLEST_DET {
                 true => sunk(problem, &self.trial),
@@ -53,6 +56,7 @@ impl LocalSolver {
                 Tried::Accepted => {
                     self.accept(step, t)?;
                     self.det = det;
+                    // The forces were solved for at the whole direction.
                     if t < 1.0 {
                         problem.blend(t);
                     }
@@ -64,6 +68,7 @@ impl LocalSolver {
                 Tried::Shortened => {}
                 Tried::GivenUp => {
                     self.place_at(base, 0.0);
+                    // Back to the forces and the state before; pairs and factor have led astray, and are forgotten.
                     problem.undo();
                     self.pairs.clear();
                     self.factor.clear();
@@ -82,6 +87,7 @@ impl LocalSolver {
             add(-1.0, &force, &mut reduced.r[place..])
         });
         self.take_loads_off(step, problem)?;
+        // The two halves of L-BFGS, with the preconditioner where an initial matrix would stand.
         let recursion = self.pairs.descend(env.isa, &mut self.reduced);
         self.d.clear(&self.near)?;
         self.precondition(step)?;
@@ -129,6 +135,7 @@ impl LocalSolver {
         let preconditioner = &*step.preconditioner;
         let (near, room) = (&self.near, &mut self.room);
         let core = 3 * near.core;
+        // `B r` in the core, in place; the residual of the core becomes the move that balances it.
         let (t, outer) = self.reduced.r.split_at_mut(core);
         let rows = outer.as_chunks::<3>().0.iter();
         let places = self.d.t[core..].as_chunks_mut::<3>().0.iter_mut();
@@ -144,6 +151,7 @@ impl LocalSolver {
         self.factor.solve(env.isa, t);
         self.factor
             .take_off(env, (near, preconditioner), room, (t, p))?;
+        // `G^-1` of what is left to the modes once the core has moved.
         preconditioner.respond_on_modes(env, p, &mut self.solved)?;
         add(1.0, &self.solved, &mut self.d.c);
         add(1.0, t, &mut self.d.t);
@@ -174,6 +182,7 @@ impl LocalSolver {
             u: &self.trial,
             start: step.input.last,
         };
+        // Columns are made as the contact asks for them, so the response changes while the problem reads it: hence the `RefCell`.
         let own = (&mut self.factor, &mut self.columns, &mut self.room);
         let response = Response {
             env,
@@ -195,6 +204,7 @@ impl LocalSolver {
             .iter()
             .copied()
             .zip(change.forces.iter().copied());
+        // The difference alone: what the loads of before do is in the direction.
         self.loads.extend(loads.filter(|load| load.1 != 0.0));
         match self.loads.is_empty() {
             true => Ok(()),
@@ -240,6 +250,7 @@ impl LocalSolver {
             square += f64::from(own) * f64::from(env.body.mass[node as usize]);
         }
         let count = env.space.count();
+        // Only the natural modes are orthogonal by mass: the others need the whole Gram matrix.
         let rows = env.space.mass().chunks_exact(count);
         for (row, value) in rows.zip(&self.d.c) {
             square += dot(row, &self.d.c) * f64::from(*value);
@@ -273,9 +284,11 @@ impl LocalSolver {
         add(t, &self.d_modes, &mut self.modes);
         add(t, &self.d_linear, &mut self.linear);
         add(t, &self.d_stiff, &mut self.stiff);
+        // `y` is the change of the residual over the step, `s` the step; the two of them are the pair.
         self.reduced.take(&self.next)?;
         self.reduced.add(-1.0, &self.residual);
         self.now.add(1.0, &self.d);
+        // Before the pair is stored: `self.residual` is the new one from here on, and `reduced` still holds the change.
         std::mem::swap(&mut self.residual, &mut self.next);
         let (near, room) = (&self.near, &mut self.room);
         let pair = (&self.d, &self.reduced);

@@ -23,10 +23,13 @@ use crate::memory::{self, HeldBytes};
 /// The pairs of a scene, oldest first by `order`.
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct Pairs {
+    /// By slot: the pair as it lasts, by nodes.
     records: Vec<Record>,
+    /// The same laid out for the near set of the moment, by place; of use where `laid_out` says so.
     steps: Vec<Step>,
     changes: Vec<Change>,
     laid_out: [bool; SLOTS],
+    /// Slots from the oldest to the newest, of the step being made and of the last published one.
     order: Vec<usize>,
     published: Vec<usize>,
     /// `s_i . y_j`.
@@ -37,6 +40,7 @@ pub(in crate::corrections) struct Pairs {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::corrections) struct Recursion {
     used: ([usize; PAIRS], usize),
+    /// `alpha_i` of the first recursion, by the place in `used`.
     alpha: [f64; PAIRS],
 }
 
@@ -127,6 +131,7 @@ impl Pairs {
             for at in 0..self.order.len() {
                 self.multiply(at);
             }
+            // Curvature on the nodes that were near before says nothing of those that are near now.
             let products = &self.products;
             self.order.retain(|&slot| products[slot][slot] > 0.0);
         }
@@ -147,6 +152,7 @@ impl Pairs {
         change.clear(near)?;
         step.c.copy_from_slice(&record.c);
         change.p.copy_from_slice(&record.p);
+        // The same tools at the same places: the same nodes, in the same order.
         if record.centres == near.centres && record.t.len() == step.t.len() {
             step.t.copy_from_slice(&record.t);
             change.r.copy_from_slice(&record.r);
@@ -171,6 +177,7 @@ impl Pairs {
             add(1.0, &step.t, &mut room.field);
             near.linear(env, &room.field, &mut room.linear);
             change.r.copy_from_slice(&room.linear[..3 * near.inside]);
+            // Where the pair knows the nonlinear change it takes the place of the linear one.
             kept(&record.r, &mut change.r);
         }
         self.laid_out[slot] = true;
@@ -181,6 +188,7 @@ impl Pairs {
     fn multiply(&mut self, at: usize) {
         let slot = self.order[at];
         for &i in &self.order[..=at] {
+            // `s_i . y_slot` with `i` not newer: the recursions ask for no others.
             self.products[i][slot] = self.changes[slot].over(&self.steps[i]);
         }
     }
@@ -202,6 +210,7 @@ impl Pairs {
         let free = |slot: &usize| !self.order.contains(slot) && !self.published.contains(slot);
         let slot = (0..SLOTS).find(free).unwrap_or(0);
         self.laid_out[slot] = false;
+        // The slot is in no list until the pair is whole: what fails below loses this pair and nothing else.
         self.records[slot].fill(near, about, step, change)?;
         self.lay_out_one(env, near, preconditioner, room, slot)?;
         self.order.push(slot);
@@ -217,6 +226,7 @@ impl Pairs {
         let used = self.used();
         let count = used.1;
         let mut products = [0.0; PAIRS];
+        // `s . r = t . r_S + c . (Phi^T r)`: both halves into the same sums.
         sum_dots(isa, &self.steps(used, |s| &s.t), &r.r, count, &mut products);
         sum_dots(isa, &self.steps(used, |s| &s.c), &r.p, count, &mut products);
         let alpha = alpha(&self.products, &used.0[..count], &products[..count]);
@@ -356,6 +366,7 @@ impl Room {
 fn sum_dots(isa: Isa, rows: &[&[f32]; PAIRS], x: &[f32], count: usize, sums: &mut [f64; PAIRS]) {
     const PIECE: usize = 4096;
     for (piece, x) in x.chunks(PIECE).enumerate() {
+        // In f32 within a piece, as the lanes have it; over thousands of nodes f32 would lose the digits that the pairs live of.
         let mut own = [0.0f32; PAIRS];
         piece_dots(isa, &rows[..count], x, piece * PIECE, &mut own[..count]);
         for (sum, own) in sums.iter_mut().zip(own) {

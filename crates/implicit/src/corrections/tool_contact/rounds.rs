@@ -23,11 +23,14 @@ const LOOKED_AT_MM: f32 = 2.0;
 /// What the iterations of a step have made.
 #[derive(Default)]
 struct Made {
+    /// In all rounds.
     iterations: u32,
     /// One after another that led nowhere.
     failed: u32,
+    /// `|r - loads|` near the tools before the first iteration and now, µN.
     start: f64,
     size: f64,
+    /// The last round ended because nothing more is asked for, and not because its base is used up.
     is_enough: bool,
 }
 
@@ -104,10 +107,12 @@ impl ImplicitSolver {
             let better = self.improve_at(context, input, problem, at, 1.0)?;
             report.iterations += 1;
             made.iterations += 1;
+            // A failure forgets the pairs, so that the next direction is another one: where that fails too, nothing helps.
             made.failed = if better { 0 } else { made.failed + 1 };
             if made.failed > 1 {
                 return Ok(());
             }
+            // What is left to go: the last move, less by as much as the residual is, as if the moves were a geometric series.
             let before = made.size;
             made.size = self.unbalanced(problem)?;
             let moved = f64::from(self.local.as_ref().map_or(0.0, |local| local.moved_mm));
@@ -115,6 +120,7 @@ impl ImplicitSolver {
             if self.suffices(made.iterations, report.remaining_mm, input.enough) {
                 return Ok(());
             }
+            // Tools that slide out of the inside nodes push on what the iterations know from the modes alone.
             let holds = (self.local.as_ref())
                 .is_none_or(|local| local.holds_loads(problem, &context.env().held.is));
             if !holds || made.iterations - first == ROUND {
@@ -135,6 +141,7 @@ impl ImplicitSolver {
     ) -> Result<()> {
         let env = context.env();
         let nodes = problem.reached(&env.held.is);
+        // The reach of the published state, not of the round before: a step that is made again reaches as far.
         let level = self.motion.level as usize;
         let (local, mut step) = self.local_solver(context, input)?;
         local.level = level;
@@ -157,6 +164,7 @@ impl ImplicitSolver {
     ) -> Result<()> {
         let mut q = std::mem::take(&mut self.q);
         let (local, mut step) = self.local_solver(context, input)?;
+        // Here the base, `t` and the modes become one field again.
         let result = local.settle(&mut step, at.g, &mut q, at.u);
         self.q = q;
         result?;
