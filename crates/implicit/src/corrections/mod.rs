@@ -32,6 +32,7 @@ mod oscillators;
 mod passes;
 mod precondition;
 mod prescribed;
+mod relax;
 mod relaxing;
 mod remember;
 mod solver;

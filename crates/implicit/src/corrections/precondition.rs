@@ -82,7 +82,6 @@ pub struct Preconditioner {
     stored: Vec<u32>,
     /// Scratch of what the compliance is gathered with.
     widened: Vec<f32>,
-    widened: Vec<f32>,
     /// `U^T r` on the way down, `U^T z` on the way up `[Q]`: every product with a field goes through here.
     pub(super) coordinates: Vec<f32>,
     /// `Phi^T r` and what the coarse level makes of it, in amplitudes of the modes `[r]`.

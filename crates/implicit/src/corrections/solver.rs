@@ -2,11 +2,8 @@
 //!
 //! REQ-082: Corrected steps follow the reference solver, and more corrections follow it closer.
 
-use crate::clock::Instant;
-
 use super::history::{History, PAIRS, Pair};
-use super::input::{Input, Report, SolverContext};
-use super::line_search::{LineSearch, Tried};
+use super::input::{Report, SolverContext};
 use super::local::{Linearisation, LocalSolver};
 use super::memory::Memory;
 use super::motion::Motion;
@@ -15,7 +12,7 @@ use super::passes;
 use super::precondition::{Env, Preconditioner, mask};
 use super::relaxing::Relaxing;
 use crate::error::{Error, Result};
-use crate::kernels::vectors::{PartialSums, dots};
+use crate::kernels::vectors::PartialSums;
 use crate::memory::{self, HeldBytes};
 
 /// A state whose smallest det F falls below this is not accepted.
@@ -289,114 +286,5 @@ impl ImplicitSolver {
         // Only a state that was accepted has forces: one that the line search tried and left must not be felt.
         let [last, stands] = &mut self.at_nodes;
         std::mem::swap(last, stands);
-    }
-
-    /// The iterations from a guess whose smallest det F is `det`.
-    pub(super) fn relax(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        mut det: f32,
-        u: &mut [f32],
-        g: &mut [f32],
-        report: &mut Report,
-    ) -> Result<()> {
-        let env = context.env();
-        let start = self.size(env, g)?;
-        for iteration in 0..input.enough.iterations {
-            let size = self.size(env, g)?;
-            let until = input.enough.until;
-            // A budget never takes the first iteration: a guess without one may be anywhere.
-            let late = until.is_some_and(|until| Instant::now() >= until);
-            if !size.is_finite() || det < SMALLEST_DET || (iteration > 0 && late) {
-                break;
-            }
-            det = self.improve(context, input.last, u, g, det, report)?;
-            report.iterations += 1;
-            report.remaining_mm = self.remaining(env, g, size)?;
-            if self.suffices(iteration + 1, report.remaining_mm, input.enough) {
-                break;
-            }
-        }
-        let end = self.size(env, g)?;
-        if !end.is_finite() || det < SMALLEST_DET {
-            u.fill(0.0);
-            // Linear elasticity from rest takes the place of a state that inverts elements, and its pairs would lead back there.
-            det = self.lead(context, input, 1.0, u, g, report)?;
-            report.fell_back = true;
-            self.memory.clear();
-        }
-        report.residual = (end / start.max(f64::MIN_POSITIVE)) as f32;
-        report.min_det = det;
-        Ok(())
-    }
-
-    /// One iteration: `u`, its residual `g` and its smallest det F become those of a better state.
-    pub(super) fn improve(
-        &mut self,
-        context: SolverContext<'_>,
-        last: &[f32],
-        u: &mut [f32],
-        g: &mut [f32],
-        det: f32,
-        report: &mut Report,
-    ) -> Result<f32> {
-        self.with_fields(|solver, fields| {
-            solver.improve_in(context, (last, u, g), det, fields, report)
-        })
-    }
-
-    /// Calls with `d`, `q` and the new residual, which come back whatever the call gives.
-    pub(super) fn with_fields<T>(
-        &mut self,
-        call: impl FnOnce(&mut ImplicitSolver, [&mut Vec<f32>; 3]) -> Result<T>,
-    ) -> Result<T> {
-        let [mut d, mut q, mut g_new] =
-            [&mut self.d, &mut self.q, &mut self.g_new].map(std::mem::take);
-        let made = call(self, [&mut d, &mut q, &mut g_new]);
-        (self.d, self.q, self.g_new) = (d, q, g_new);
-        made
-    }
-
-    fn improve_in(
-        &mut self,
-        context: SolverContext<'_>,
-        (last, u, g): (&[f32], &mut [f32], &mut [f32]),
-        det: f32,
-        [d, q, g_new]: [&mut Vec<f32>; 3],
-        report: &mut Report,
-    ) -> Result<f32> {
-        let env = context.env();
-        let preconditioner = &mut self.preconditioner;
-        let nodes = &self.nodes;
-        self.memory.direction(env, g, q, d, |q, z| {
-            mask(nodes, q);
-            preconditioner.apply(env, q, z)
-        })?;
-        mask(&self.nodes, d);
-        let mut slope = [0.0];
-        dots(env.isa, env.pool, &[g], d, &mut self.partial, &mut slope)?;
-        let [slope] = slope;
-        let mut search = LineSearch::new(slope);
-        loop {
-            let t = search.t;
-            passes::shorten(env, u, d, t, q)?;
-            let (det_new, slope_new) = self.residual(context, [last, q, d], g_new, report)?;
-            match search.judge(det_new > SMALLEST_DET, slope_new) {
-                Tried::Accepted => {
-                    self.stand();
-                    u.copy_from_slice(q);
-                    passes::difference(env, g_new, g, q)?;
-                    self.memory.store(env, d, t, q)?;
-                    g.copy_from_slice(g_new);
-                    return Ok(det_new);
-                }
-                Tried::Shortened => {}
-                Tried::GivenUp => {
-                    self.memory.clear();
-                    return Ok(det);
-                }
-            }
-        }
     }
 }

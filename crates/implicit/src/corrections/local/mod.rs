@@ -82,10 +82,8 @@ pub(super) struct Gain {
 pub struct LocalSolver {
     near: NearSet,
     pub(super) pairs: Pairs,
-    /// What the law adds to linear elasticity in the far clusters.
     clusters: Clusters,
     pub(super) factor: NearFactor,
-    /// The contact's columns by the factor that there is, as far as they have been asked for.
     columns: NearColumns,
     /// Nodes that the tools touch, thinned out: what the pairs are about.
     about: Vec<u32>,
@@ -128,7 +126,6 @@ pub struct LocalSolver {
     /// Farthest that a far node has gone since the base, mm.
     pub(super) far_moved_mm: f32,
     partial: PartialSums,
-    /// Scratch, from here to the end.
     room: Room,
     on_modes: Vec<f32>,
     more_on_modes: Vec<f32>,
@@ -197,7 +194,6 @@ impl LocalSolver {
         slot: &'a mut Option<Box<LocalSolver>>,
         context: SolverContext<'_>,
     ) -> Result<&'a mut LocalSolver> {
-        // Taken and put back in one expression: whatever fails, the slot is empty or whole.
         let local = match slot.take() {
             Some(local) => local,
             None => memory::boxed(LocalSolver::new(context)?, WHAT)?,
@@ -225,7 +221,6 @@ impl LocalSolver {
             .last()
             .map(|record| record.centres.as_slice());
         self.near.choose(rest, last, &self.about, abouts)?;
-        // All that is laid out by place is of no use for another set: pairs, clusters and the factor's plan are made for this one.
         if !self.near.is_chosen(self.level) {
             self.pairs.forget_layout();
             self.near.fill(env, far, rest, self.level)?;
@@ -254,7 +249,6 @@ impl LocalSolver {
         self.trial.copy_from_slice(base.u);
         self.d.clear(&self.near)?;
         self.far_det = f32::MAX;
-        // The near elements at the base itself: what they add later is counted from here, so that their rounding cancels.
         self.evaluate(step, 0.0)?;
         std::mem::swap(&mut self.residual, &mut self.next);
         // What the base has is not what has come since.
@@ -280,7 +274,6 @@ impl LocalSolver {
 
     /// Whether all nodes that the tools push are inside.
     pub(super) fn holds_loads(&self, problem: &ContactProblem, held: &[bool]) -> bool {
-        // A load on any other node acts through the modes alone.
         let mut holds = true;
         problem.each_load(|node, _| holds &= held[node as usize] || self.near.holds(node));
         holds
