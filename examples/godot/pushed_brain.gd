@@ -3,6 +3,7 @@
 #   --seconds=S         how long, then quit (default: until the window is closed)
 #   --corrections=N, --target=MM, --substeps=N, --step=S
 #                       the tissue's properties of these names (default: what the bundle recommends)
+#   --cut               a blade cuts a slit of 30 mm in place of the spatula's push; --check takes it back
 #   --breathe=MM        what holds the organ goes up and down by so much, once in four seconds
 #   --wait              each frame waits for the step in flight: the same pictures on every machine
 #   --screenshot=FILE   PNG of the window at the deepest push (needs a display)
@@ -17,11 +18,18 @@ const ROUNDING := 1.0
 const PERIOD := 2.0
 const LATER := 0.05
 const BREATH := 4.0
+# Of a cut, and how deep.
+const BLADE := 1
+const SLIT := 0.03
+const SLIT_DEPTH := 0.008
 
 var tissue: SoftTissue3D
 var spatula: MeshInstance3D
+# Of what was outside, and of what a blade has laid open.
+var materials: Array[StandardMaterial3D] = []
 var rest := PackedVector3Array()
 var faces := PackedInt32Array()
+var changes := 0
 var site := Vector3.ZERO
 var outward := Vector3.ZERO
 # Of the middle of the blade over the site, where it touches nothing yet.
@@ -66,9 +74,15 @@ func _ready() -> void:
 	var material := StandardMaterial3D.new()
 	material.vertex_color_use_as_albedo = true
 	material.roughness = 0.55
-	tissue.material_override = material
+	materials.append(material)
+	var flesh := StandardMaterial3D.new()
+	flesh.albedo_color = Color(0.55, 0.14, 0.12)
+	flesh.roughness = 0.5
+	materials.append(flesh)
 	find_site()
 	tissue.hold(0.2, false, 0.0)
+	if options.has("cut"):
+		tissue.work_as(BLADE)
 	if options.has("breathe") and not tissue.breathe(0.001 * float(options["breathe"]), BREATH):
 		finish("could not breathe: " + tissue.message())
 		return
@@ -84,6 +98,9 @@ func _process(delta: float) -> void:
 	var before := spatula.position if frames > 1 else Vector3.INF
 	var press := 0.5 - 0.5 * cos(TAU * now / PERIOD)
 	var pose := Transform3D(Basis(Quaternion(Vector3.BACK, outward)), site + outward * (above - press * DEPTH))
+	if options.has("cut"):
+		var aside := outward.cross(Vector3.RIGHT).normalized() * (minf(now / (0.5 * PERIOD), 1.0) - 0.5) * SLIT
+		pose = Transform3D(Basis(Quaternion(Vector3.UP, outward)), site + aside + outward * (0.001 * HALF_EXTENTS.y - SLIT_DEPTH))
 	spatula.transform = pose
 	tissue.press(SPATULA, pose.origin, pose.basis.get_rotation_quaternion(), HALF_EXTENTS, ROUNDING)
 	var started := Time.get_ticks_usec()
@@ -100,9 +117,15 @@ func _process(delta: float) -> void:
 	largest_error = maxf(largest_error, tissue.error_mm())
 	started = Time.get_ticks_usec()
 	var points := tissue.vertices()
+	if changes != tissue.changes():
+		changes = tissue.changes()
+		rest = tissue.rest()
+		faces = tissue.faces()
+		shown = points
 	show_surface(points)
 	upload_ms = maxf(upload_ms, 0.001 * (Time.get_ticks_usec() - started))
-	look(points, pose, before.distance_to(pose.origin) if before.is_finite() else 0.0)
+	if not options.has("cut"):
+		look(points, pose, before.distance_to(pose.origin) if before.is_finite() else 0.0)
 	if options.has("screenshot") and now >= 0.5 * PERIOD and not pictured:
 		pictured = true
 		await RenderingServer.frame_post_draw
@@ -134,7 +157,22 @@ func look(points: PackedVector3Array, pose: Transform3D, way: float) -> void:
 	shown = points
 
 
+func problem_of_cut() -> String:
+	var area := tissue.cut_area()
+	var inside_faces := (faces.size() - tissue.outside()) / 3
+	if area < 100.0 or inside_faces < 10 or largest_force == 0.0:
+		return "%.0f mm² are cut, %d faces lie inside; the blade feels %.0f mN; expected 100, 10 and more than 0" % [area, inside_faces, largest_force]
+	if not tissue.undo() or tissue.cut_area() != 0.0 or tissue.undo():
+		return "the one stroke is not taken back"
+	if tissue.faces().size() != tissue.outside() or tissue.work_as(7):
+		return "there is still something inside, or a tool of no kind"
+	print("a slit of %.0f mm²: %d faces inside" % [area, inside_faces])
+	return ""
+
+
 func problem_of_all() -> String:
+	if options.has("cut"):
+		return problem_of_cut()
 	if most_contacts == 0:
 		return "the spatula never touched the tissue"
 	if largest < 0.005 or largest > 0.03:
@@ -262,7 +300,11 @@ func show_surface(points: PackedVector3Array) -> void:
 	arrays[Mesh.ARRAY_VERTEX] = points
 	arrays[Mesh.ARRAY_NORMAL] = normals
 	arrays[Mesh.ARRAY_COLOR] = colors
-	arrays[Mesh.ARRAY_INDEX] = faces
 	var mesh := ArrayMesh.new()
-	mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays)
+	var outside := tissue.outside()
+	for part in [faces.slice(0, outside), faces.slice(outside)]:
+		if part.size() > 0:
+			arrays[Mesh.ARRAY_INDEX] = part
+			mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays)
+			mesh.surface_set_material(mesh.get_surface_count() - 1, materials[mesh.get_surface_count() - 1])
 	tissue.mesh = mesh

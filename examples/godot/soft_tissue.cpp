@@ -5,8 +5,9 @@
  * clockwise faces as front, which `faces` takes into account).
  *
  * Script side: open(bundle), rest(), faces(), hold(friction, grasp, tear_off_mn), press(shape,
- * position, rotation, half_extents, radius), release(), breathe(amplitude, period), frame(now),
- * wait(), vertices(), step_ms(), contact_count(), force(), penetration(), flags(),
+ * position, rotation, half_extents, radius), release(), work_as(kind), undo(),
+ * breathe(amplitude, period), frame(now), wait(), changes(), outside(), cut_area(), removed(),
+ * vertices(), step_ms(), contact_count(), force(), penetration(), flags(),
  * corrections_made(), error_mm(), message(). `press` and `release` say where the tool is now,
  * `frame` makes the surface of this moment; steps run on a worker meanwhile.
  *
@@ -15,8 +16,8 @@
  * estimated error is below this, 0: always so many), substeps (1 to 8: the most of a step that
  * would err by more than the target, 0: what the bundle recommends), step_s (length of a step, s,
  * 0.01 to 0.05, 0: what the bundle recommends for frames). */
+#include "soft_tissue.hpp"
 #include "godot_api.h"
-#include "tissue.hpp"
 
 #include <cstring>
 #include <exception>
@@ -26,37 +27,6 @@
 
 static const char CLASS_NAME[] = "SoftTissue3D";
 static const float METRES = 0.001f;
-
-struct SoftTissue {
-  std::unique_ptr<Tissue> tissue;
-  Effort effort;                                     // of the steps, from the next open on
-  upt_instrument hold = upt::make<upt_instrument>(); // how the tool holds the tissue
-  std::string message;                               // of the last failed call
-};
-
-// Runs what may throw: an engine knows no exceptions. The message is kept, and printed in the
-// engine's console. False too where no bundle is open.
-template <typename Run> static bool guarded(SoftTissue *self, Run run) {
-  try {
-    run();
-    return true;
-  } catch (const std::exception &error) {
-    self->message = error.what();
-    godot_error(error.what());
-    return false;
-  }
-}
-template <typename Run> static bool opened(void *instance, Run run) {
-  auto *self = static_cast<SoftTissue *>(instance);
-  return self->tissue && guarded(self, [&] { run(*self->tissue); });
-}
-
-static void put(GDExtensionTypePtr result, bool done) {
-  *static_cast<GDExtensionBool *>(result) = done;
-}
-static double real(GDExtensionConstTypePtr argument) {
-  return *static_cast<const double *>(argument);
-}
 
 static void open_bundle(void *instance, const GDExtensionConstTypePtr *arguments,
                         GDExtensionTypePtr result) {
@@ -307,6 +277,12 @@ static const GodotMethod METHODS[] = {
      {{"friction", T(FLOAT)}, {"grasp", T(BOOL)}, {"tear_off_mn", T(FLOAT)}}},
     {"release", release, T(BOOL), 0, {}},
     {"breathe", breathe, T(BOOL), 2, {{"amplitude", T(FLOAT)}, {"period", T(FLOAT)}}},
+    {"work_as", work_as, T(BOOL), 1, {{"kind", T(INT)}}},
+    {"undo", undo, T(BOOL), 0, {}},
+    {"changes", changes, T(INT), 0, {}},
+    {"outside", outside, T(INT), 0, {}},
+    {"cut_area", cut_area, T(FLOAT), 0, {}},
+    {"removed", removed, T(FLOAT), 0, {}},
     {"frame", frame, T(BOOL), 1, {{"now", T(FLOAT)}}},
     {"wait", wait, T(BOOL), 0, {}},
     {"vertices", vertices, T(PACKED_VECTOR3_ARRAY), 0, {}},

@@ -77,6 +77,9 @@ static float up(float amplitude, double period, double now) {
 }
 
 void Tissue::breathe(float amplitude, double period) {
+  if (is_cut_ && amplitude != 0) {
+    throw std::runtime_error("breathe: the body has been cut");
+  }
   if (!(period > 0.1) || !(std::fabs(amplitude) < 100)) {
     throw std::runtime_error("breathe: a period above 0.1 s and less than 100 mm");
   }
@@ -97,6 +100,14 @@ void Tissue::frame(double now) {
   const upt::span<const upt_instrument> tools(&framed, in_hand ? 1 : 0);
   if (!solves_contact_) {
     follow(now, tools);
+    return;
+  }
+  if (is_cut_ || kind != Kind::press) {
+    if (amplitude_ != 0) {
+      throw std::runtime_error(
+          "what holds the organ moves: breathe(0, 1) before a tool changes it");
+    }
+    work(now, tools);
     return;
   }
   clock_.frame(scene_, now, tools, displacement_);
