@@ -65,9 +65,11 @@ impl From<PoolError> for Error {
 /// A small thread pool. Shared by reference; any thread may call [`Pool::run`].
 pub struct Pool {
     shared: Arc<Shared>,
+    /// All threads but the caller's.
     workers: Vec<JoinHandle<()>>,
     /// Held by the caller whose job the workers run.
     submit: Mutex<()>,
+    /// Whether the workers have been of use, by time.
     turns: Mutex<Turns>,
     /// A caller under [`Pool::keep_awake`] leaves the workers out.
     is_alone: AtomicBool,
@@ -131,6 +133,7 @@ impl Pool {
     /// [`PoolError::Panicked`] names the first chunk seen to panic; others may not have run.
     pub fn run(&self, chunk_count: usize, task: &Task<'_>) -> Result<(), PoolError> {
         let _flush = FlushToZero::of(self.isa);
+        // Whoever comes second computes alone: waiting for another scene's job would take longer than its own chunks.
         let submit = match self.submit.try_lock() {
             Ok(guard) => Some(guard),
             Err(std::sync::TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
@@ -150,6 +153,7 @@ impl Pool {
             shared.next.store(0, Ordering::Relaxed);
             shared.failed.store(false, Ordering::Relaxed);
             state.panic = None;
+            // A new number, by which a worker tells this job from the one that it has just left.
             state.epoch += 1;
             state.job = Some(Job {
                 task: task_address,
@@ -157,12 +161,15 @@ impl Pool {
             });
             shared.epoch.store(state.epoch, Ordering::Release);
         }
+        // As many as there are chunks beside the caller's own: the others sleep on.
         for _ in 0..self.workers.len().min(chunk_count - 1) {
             shared.wake.notify_one();
         }
         shared.work(task, chunk_count, 0);
         let mut state = shared.lock();
+        // From here on no worker can enter; those inside are waited for, since the task is borrowed from the caller.
         state.job = None;
+        // The last chunks end within microseconds of each other: a look is shorter than going to sleep.
         if state.active > 0 && shared.is_awake() {
             drop(state);
             shared.look(|| shared.active.load(Ordering::Acquire) == 0);

@@ -186,6 +186,7 @@ pub fn row_dots(
     out: &mut [f32],
 ) -> Result<(), PoolError> {
     assert_eq!(rows.len(), out.len(), "one result a row");
+    // Once for all: the lanes read without looking.
     if let Some(&last) = rows.iter().max() {
         assert!((last as usize + 1) * q.len() <= table.len(), "row {last}");
     }
@@ -237,6 +238,7 @@ unsafe fn dots_body<V: DenseLanes>(
                 let row = rows[i.min(rows.len() - 1)] as usize;
                 table.as_ptr().add(row * q.len())
             };
+            // Four rows share each load of `q`; a last group of fewer takes its last row several times.
             let rows = [row(0), row(1), row(2), row(3)];
             let mut total = [V::splat(0.0); 4];
             let mut at = 0;
@@ -247,6 +249,7 @@ unsafe fn dots_body<V: DenseLanes>(
                 }
                 at += V::COUNT;
             }
+            // What is left of a row comes last, in the same order for every set of rows.
             let mut sums = V::sums(total);
             for (at, q) in q.iter().enumerate().skip(at) {
                 for i in 0..4 {

@@ -142,6 +142,7 @@ impl Compliance {
         scratch: &mut Vec<f32>,
     ) {
         let order = 3 * columns.len();
+        // Contact nodes of the table; columns beyond belong to copies of nodes that a cut has made.
         let own = match self {
             Compliance::Whole(whole) => whole.len().isqrt() / 3,
             Compliance::Near(near) => near.ranks.len(),
@@ -245,6 +246,7 @@ fn far_block(
 impl Near {
     /// The stored block of two contact nodes, where they are neighbours.
     fn block(&self, row: usize, across: usize) -> Option<[f32; 9]> {
+        // Blocks lie in the upper triangle; below it they are turned.
         let (low, high) = (row.min(across), row.max(across));
         let range = self.offsets[low] as usize..self.offsets[low + 1] as usize;
         let at = self.nodes[range.clone()]
@@ -273,7 +275,9 @@ impl Near {
                 scratch.resize(6 * rank, 0.0);
             }
             let (rows, forces) = scratch[..6 * rank].split_at_mut(3 * rank);
+            // The node's rows of the basis are widened once, and only if one of its columns is far.
             let mut widened = false;
+            // Columns and neighbours both ascend: one pass over the two.
             let mut next = range.start;
             for (j, &other) in columns.iter().enumerate().skip(i) {
                 if are_known(known, i, j) {

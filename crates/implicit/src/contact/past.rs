@@ -119,6 +119,7 @@ impl Past {
                 return bad("a grasp");
             }
         }
+        // They are found by binary search.
         let ascends = forces.is_sorted_by(|a, b| a.key() < b.key());
         let known = |one: &Force| {
             let is_row = match tie_of(one.sample) {
@@ -130,6 +131,7 @@ impl Past {
         if !ascends || !forces.iter().all(known) {
             return bad("a force");
         }
+        // A tie has its far end in the tissue, in a tool or in space: only the first has nodes of its own.
         let is_sound = |HeldTie { placed, .. }: &HeldTie| {
             let far = match placed.tie.end {
                 End::Tissue(far) => far.nodes,

@@ -1,4 +1,4 @@
-//! BDF2 over the steps of a stage: what it knows before a step, velocities and inertia after it, and what it leaves out.
+//! BDF2 over the steps of a solver: what it knows before a step, velocities and inertia after it, and what it leaves out.
 
 use super::Integrator;
 use super::input::{Input, SolverContext};

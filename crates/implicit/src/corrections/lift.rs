@@ -53,6 +53,7 @@ fn functions(rest: &[f32], nodes: &[u32]) -> Result<Vec<Vec<f32>>> {
             .iter()
             .map(|node| f64::from(rest[3 * *node as usize + axis]));
         let mut own: Vec<f64> = memory::collected(nodes.len(), along, WHAT)?;
+        // Gram and Schmidt over the nodes: a group that lies in a plane, or is one node, has fewer functions.
         for other in &made {
             let part: f64 = own.iter().zip(other).map(|(a, b)| a * b).sum();
             let part = part / nodes.len() as f64;
@@ -77,6 +78,7 @@ impl Lift {
     fn new(context: SolverContext<'_>, rest: &[f32], nodes: &[u32]) -> Result<Lift> {
         let body = &context.corrections.body;
         let len = 3 * body.mass.len();
+        // Another boundary than any scene's: all groups held, this one led by a function at a time.
         let mut held = Held::new(body.mass.len(), body.held.nodes.iter().copied())?;
         held.places = memory::zeros(3 * held.nodes.len(), WHAT)?;
         let zero = memory::zeros(len, WHAT)?;
@@ -138,6 +140,7 @@ impl ImplicitSolver {
         self.drift.fill(0.0);
         let mut u = memory::zeros(input.last.len(), WHAT)?;
         let mut g = memory::zeros(input.last.len(), WHAT)?;
+        // Only the group is displaced at first; the iterations find what the body does between it and what is held.
         context.held.put(&mut u);
         let mut report = Report::default();
         let (det, _) = self.residual(context, [input.last, &u, &u], &mut g, &mut report)?;
@@ -175,6 +178,7 @@ impl ImplicitSolver {
                 let (to, at) = (held.place(index), 3 * node as usize);
                 [0, 1, 2].map(|axis| to[axis] - from.map_or(0.0, |from| from[at + axis]))
             };
+            // A group that stays has no part in the guess, and its columns need not be made for it.
             if group.nodes.iter().all(|node| change(*node) == [0.0; 3]) {
                 continue;
             }
@@ -184,6 +188,7 @@ impl ImplicitSolver {
                 lift.add((column, amount), u);
             }
         }
+        // The columns take the group to where it goes but for rounding; exactly there are its nodes now.
         held.put(u);
         Ok(())
     }
@@ -241,6 +246,7 @@ impl ImplicitSolver {
                 *own = lift.row(field, node).map(|w| part * w);
             }
             let [stiff, heavy] = &mut products;
+            // Over so little the residual is linear: it is `(K + kappa M) u`, and the mass's part comes off below.
             self.residual(context, [&zero, &u, &u], stiff, &mut Report::default())?;
             for (i, (stiff, heavy)) in stiff.iter_mut().zip(&mut *heavy).enumerate() {
                 *heavy = env.body.mass_of_dof[i] * u[i] / TRIAL_MM;

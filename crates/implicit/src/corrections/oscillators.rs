@@ -52,6 +52,7 @@ impl Oscillators {
         let natural = context.corrections.space.natural()?;
         let integrator = context.time_step.integrator;
         let turned = |omega: f32| f64::from(omega) * integrator.step_s;
+        // The modes ascend by frequency.
         let resolved = natural.iter().take_while(|mode| turned(mode.0) <= RESOLVED);
         let count = resolved.clone().count();
         let oscillators = resolved.map(|&(omega, mass)| {
@@ -90,6 +91,7 @@ impl Oscillator {
     /// Where it is after a step of `h`, and how fast.
     pub(super) fn after(&self, h: f64) -> (f64, f64) {
         let ([a, b, c, d], w) = (self.over, h * self.velocity);
+        // It swings about where it would rest under what pushes it.
         let rest = (self.beside() + self.load) / self.square;
         let place = self.place - rest;
         (rest + a * place + b * w, (c * place + d * w) / h)

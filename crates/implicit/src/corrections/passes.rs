@@ -98,6 +98,7 @@ pub(super) fn add_smoothed(
                 ];
                 for (change, own) in change.iter_mut().zip(own) {
                     *change -= FAR_WEIGHT * own;
+                    // How far the far field is out of balance: it says whether the next step has to reach farther.
                     sum[0] += (FAR_WEIGHT * own).powi(2);
                 }
             }
@@ -192,6 +193,7 @@ pub(super) fn square(env: Env<'_>, a: &[f32], partial: &mut PartialSums) -> Resu
 
 /// Zero at the held nodes of a piece.
 fn hold(env: Env<'_>, range: &Range<usize>, field: &mut [f32]) {
+    // Pieces are whole nodes, and held ones ascend.
     let nodes = (range.start / 3) as u32..(range.end / 3) as u32;
     let held = &env.held.nodes;
     let first = held.partition_point(|node| *node < nodes.start);

@@ -25,6 +25,7 @@ pub struct Substepper {
     count: u32,
     #[held(own)]
     pub(super) time_step: Arc<TimeStep>,
+    /// From here to `motion`: those of shorter steps while whole ones are made, and the other way round; see [`ImplicitSolver::exchange`].
     preconditioner: Preconditioner,
     free: Oscillators,
     pub(super) motion: Motion,
@@ -45,7 +46,7 @@ impl Substepper {
         count: u32,
     ) -> Result<Substepper> {
         let len = 3 * context.corrections.body.mass.len();
-        let field = || memory::zeros(len, "the substepper steps of a scene");
+        let field = || memory::zeros(len, "the substeps of a scene");
         let short = SolverContext {
             time_step: &time_step,
             ..context
@@ -80,6 +81,7 @@ impl Substepper {
             self.before.copy_from_slice(input.last);
             return Ok(());
         }
+        // Hermite's cubic on the last step, at the part `s` of it: weights of the two places and the two velocities.
         let s = 1.0 - 1.0 / self.count as f32;
         let (s2, s3) = (s * s, s * s * s);
         let place = [
@@ -119,7 +121,7 @@ impl Substepper {
 }
 
 impl ImplicitSolver {
-    /// The stage makes shorter steps from here on; or whole ones again.
+    /// The solver makes shorter steps from here on; or whole ones again.
     pub(super) fn exchange(&mut self, substepper: &mut Substepper) {
         swap(&mut self.motion, &mut substepper.motion);
         swap(&mut self.preconditioner, &mut substepper.preconditioner);
@@ -150,7 +152,7 @@ impl ImplicitSolver {
     /// that its time lets in.
     ///
     /// # Errors
-    /// A panic on another thread of the pool; the past of the stage stays.
+    /// A panic on another thread of the pool; the past of the solver stays.
     pub fn swing(
         &mut self,
         context: SolverContext<'_>,
@@ -175,6 +177,7 @@ impl ImplicitSolver {
             context.time_step.integrator.step_s as f32,
         )?;
         self.exchange(substepper);
+        // The pairs of whole steps come back below; among those of shorter ones they would be wrong by their inertia.
         self.clear_pairs();
         let result = self.swing_each(context, input, substepper);
         self.exchange(substepper);
@@ -197,6 +200,7 @@ impl ImplicitSolver {
                 time_step: &substepper.time_step,
                 ..context
             };
+            // `still` is of the first alone, and `start` has seen to it.
             let own = Input {
                 last: &substepper.last,
                 before: &substepper.before,

@@ -67,7 +67,7 @@ impl ImplicitSolver {
     /// for: by what the last step left out, or else by what this one does.
     ///
     /// # Errors
-    /// [`crate::Error::OutOfMemory`], a panic on another thread of the pool; the past of stage and problem stays.
+    /// [`crate::Error::OutOfMemory`], a panic on another thread of the pool; the past of solver and problem stays.
     pub fn drive(
         &mut self,
         context: SolverContext<'_>,

@@ -24,9 +24,12 @@ unsafe impl Send for Job {}
 
 pub struct State {
     pub job: Option<Job>,
+    /// Number of the job, counted up by each.
     pub epoch: u64,
     pub active: usize,
+    /// The pool is dropped: workers end.
     pub closing: bool,
+    /// The first chunk that panicked, with its message.
     pub panic: Option<(usize, String)>,
 }
 
@@ -34,7 +37,9 @@ pub struct Shared {
     pub state: Mutex<State>,
     pub wake: Condvar,
     pub done: Condvar,
+    /// The chunk that is taken next; beyond the job's count where none is left.
     pub next: AtomicUsize,
+    /// A chunk has panicked: the rest is skipped.
     pub failed: AtomicBool,
     /// Callers that hold [`super::Pool::keep_awake`].
     pub awake: AtomicUsize,
@@ -84,6 +89,7 @@ impl Shared {
     /// Takes chunks until none is left or one has panicked.
     pub fn work(&self, task: &Task<'_>, chunk_count: usize, worker: usize) {
         while !self.failed.load(Ordering::Relaxed) {
+            // The counter alone decides who computes a chunk; what it writes is seen by all once `active` is 0.
             let chunk = self.next.fetch_add(1, Ordering::Relaxed);
             if chunk >= chunk_count {
                 return;
@@ -124,6 +130,7 @@ pub fn worker_loop(shared: &Shared, isa: Isa, worker: usize) {
             }
             _ if shared.is_awake() && !looked => {
                 looked = true;
+                // Once between two sleeps: a worker that looks for longer takes a core that the host may want.
                 let last = state.epoch;
                 drop(state);
                 shared.look(|| shared.epoch.load(Ordering::Acquire) != last);

@@ -114,6 +114,7 @@ impl ContactProblem {
             moving.contact(&row, part).gap
         };
         let forces = &self.next.forces;
+        // Three kinds: samples inside of the tool, samples that it pushes and may have passed, and where it comes out itself.
         let inside = self.search.found().iter().map(|candidate| {
             let key = (index as u32, candidate.sample);
             let place = forces.binary_search_by_key(&key, Force::key);
@@ -143,11 +144,13 @@ impl ContactProblem {
         for (index, tool) in self.tools.iter().enumerate() {
             let (samples, mesh, sides) = (&self.samples, &self.mesh, &mut self.sides);
             let found = Buried::find(&tool.body, &tool.pose, samples, mesh, state, sides);
+            // Out by its whole size, so that it comes back in from outside of all samples.
             let clear = tool.body.size() + OPEN_MM;
             let came = self.before[index].translation - tool.pose.translation;
             let own = self.past.forces.iter();
             let own = own.filter(|force| force.tool == index as u32);
             let pushed: Vector = own.map(|force| -force.force).sum();
+            // A tool that is held still has come from nowhere: then the push it feels tells which side it is on.
             let came = if came.length() > OPEN_MM {
                 came
             } else {

@@ -76,6 +76,7 @@ impl ContactProblem {
                 .next
                 .forces
                 .binary_search_by_key(&kept.key(), Force::key);
+            // Also of samples that the solve has let go: part of the way there they still push.
             let share = kept.force * (1.0 - part);
             match found {
                 Ok(place) => self.next.forces[place].force += share,

@@ -82,11 +82,13 @@ impl ContactProblem {
             let penetration_mm = self.depth(index, state, 1.0);
             let tool = &self.tools[index];
             let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
+            // What a grasp bears is the pull along the mean normal of its jaws: pressure holds it, tension tears it.
             let (mut pull, mut normal) = (Vector::ZERO, Vector::ZERO);
             let mut contacts = 0;
             let held = &self.next.tools[index];
             for row in self.next.forces.iter().filter(|f| f.tool == index as u32) {
                 let point = self.samples.at(row.sample).gather(|n| state.position(n));
+                // `row.force` is on the tissue, and the tool feels the opposite.
                 force -= row.force;
                 torque -= (point - tool.pose.translation).cross(row.force);
                 contacts += 1;

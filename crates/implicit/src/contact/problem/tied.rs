@@ -20,6 +20,7 @@ impl ContactProblem {
     pub(super) fn tie(&mut self, ties: &[Placed]) -> Result<()> {
         let is_other = ties.len() != self.tied.list.len()
             || !(ties.iter().zip(&self.tied.list)).all(|(a, b)| a.has_nodes_of(b));
+        // Rows of ties are known by number: what was computed for another list must not be taken for this one's.
         if is_other {
             self.tied.generation += 1;
         }
@@ -32,6 +33,7 @@ impl ContactProblem {
         for (index, placed) in ties.iter().enumerate() {
             let known = (held.get(index)).filter(|known| known.placed.goes_on_as(placed));
             let from = known.map(|known| known.placed.place);
+            // A far end that leaps has no way, as a tool that is put elsewhere has none.
             let near = from.filter(|from| from.distance(placed.place) <= PUT_MM);
             self.tied.from.push(near.unwrap_or(placed.place));
             let now = HeldTie {
@@ -56,6 +58,7 @@ impl ContactProblem {
     /// # Errors
     /// As [`ContactProblem::begin`].
     pub fn begin_frame(&mut self, tools: &[Tool], rest: &[f32], start: &[f32]) -> Result<()> {
+        // Out of the problem while it takes them; the list and its room come back whatever that gives.
         let mut ties = std::mem::take(&mut self.tied.given);
         ties.clear();
         let begun = memory::fit(&mut ties, self.past.ties.len(), WHAT).and_then(|()| {
@@ -146,6 +149,7 @@ impl ContactProblem {
             };
             hardest = hardest.max(strain(held, way));
         }
+        // The step is made again without those that break here, so that the others can take on what these bore.
         if !breaks || hardest <= 1.0 {
             return;
         }

@@ -128,6 +128,7 @@ impl NearSet {
             add_centres(rest, about, &mut self.chosen)?;
         }
         self.chosen.sort_unstable();
+        // As long as the last pair's centres serve, they stay: a set that is filled anew costs as much as some iterations.
         let Some(last) = last else {
             return Ok(());
         };
@@ -163,12 +164,14 @@ impl NearSet {
         }
         let reach = self.reach(far, rest, level);
         self.take_elements(env, far, rest, reach)?;
+        // Where most nodes are near, all are: what the far ones save is less than their clusters cost.
         let most = LARGEST_PART * self.places.len() as f32;
         if reach < f32::MAX && self.nodes.len() as f32 > most {
             self.take_elements(env, far, rest, f32::MAX)?;
         }
         (self.inside, self.free, self.core) = (0, 0, 0);
         self.find_core(far, rest)?;
+        // The order of the places: core, inside, free with elements that are far, held. Each set is then a range that begins at 0.
         let rank = |node: u32| {
             let at = node as usize;
             let whole = self.counts[at] == far.elements_at[at];
@@ -264,6 +267,7 @@ impl NearSet {
         };
         for (chunk, bounds) in far.boxes.iter().enumerate() {
             self.far_share[chunk] = 1.0;
+            // Chunks whose box no centre reaches are not looked at node by node.
             if is_by_box(bounds) {
                 for &node in forces.chunk_nodes(chunk) {
                     self.is_reached[node as usize] = is_reached(node);

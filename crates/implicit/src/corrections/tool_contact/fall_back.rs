@@ -21,6 +21,7 @@ impl ImplicitSolver {
         self.clear_pairs();
         // A state whose elements are sound though its contact is lost.
         let found_sound = at.det >= SMALLEST_DET;
+        // `d` is scratch here: no direction is asked for any more.
         self.d.copy_from_slice(at.u);
         problem.keep_sound()?;
         problem.take_guess();
@@ -85,6 +86,7 @@ impl ImplicitSolver {
         at: &mut Iterate<'_>,
         report: &mut Report,
     ) -> Result<()> {
+        // From rest the tools come from outside: their way out of the tissue of the last state means nothing there.
         problem.start_from_rest(input.rest);
         at.u.fill(0.0);
         self.lift(context, input, None, at.u)?;
