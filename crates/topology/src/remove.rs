@@ -3,13 +3,15 @@
 use std::sync::OnceLock;
 
 use crate::body::{Body, Cell, Change, place};
+use crate::elements::LEAST_SHARE;
 use crate::elements::filled;
 use crate::polytope::{Polytope, Weights};
 use crate::room::{collected, push};
 use crate::{Point, TopologyError};
 
-/// A cell of which less is left, as a part of its element, goes.
-pub const LEAST_LEFT: f64 = 0.02;
+/// A cell of which less is left, as a part of its element, goes. It is [`LEAST_SHARE`] of an element: of a node that hangs by a fiftieth, a tool that touched
+/// it made a step of 50 mm.
+pub const LEAST_LEFT: f64 = LEAST_SHARE;
 
 impl Body {
     /// Takes what lies where `depth` is positive, the deepest first, up to `most_mm3`; `positions` says where each node is now, copies included. `depth` must
@@ -54,21 +56,24 @@ impl Body {
             if taken + 0.5 * point.volume > most_mm3 {
                 break;
             }
+            let whole = self.mesh().volume(point.element);
             let cell = &mut next.cells_mut(point.element)[point.cell];
+            if !cell.is_alive {
+                continue;
+            }
             let before = cell.points_left();
             cell.gone |= 1 << point.at;
             cell.kept *= f64::from(before - 1) / f64::from(before);
             taken += point.volume;
+            let left = cell.share * cell.kept;
+            if left < LEAST_LEFT {
+                cell.is_alive = false;
+                taken += left * whole;
+            }
             push(&mut change.elements, point.element)?;
         }
         change.elements.sort_unstable();
         change.elements.dedup();
-        for &element in &change.elements {
-            let cells = next.cells_mut(element);
-            for cell in cells.iter_mut().filter(|cell| cell.gone & cell.points != 0) {
-                cell.is_alive &= cell.share * cell.kept >= LEAST_LEFT;
-            }
-        }
         next.account(self, &mut change);
         if next.is_nothing() {
             return Err(TopologyError::NothingLeft);

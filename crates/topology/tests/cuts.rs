@@ -5,6 +5,7 @@ mod block;
 use std::sync::Arc;
 
 use block::{Draw, block, open_edges, rest};
+use topology::elements::LEAST_SHARE;
 use topology::{Blade, Body, Change, Point, Surface, Sweep, TopologyError};
 
 /// A blade's edge of two points at two poses: the plane `x = at` from `z` upward, `y` from `y[0]` to `y[1]`.
@@ -177,6 +178,9 @@ fn an_aspirator_takes_what_it_is_given_time_for() {
             change.removed_mm3
         );
         taken += change.removed_mm3;
+        // What hangs by less is thrown by what touches it.
+        let least = body.elements().map(|element| element.share);
+        assert!(least.fold(1.0, f64::min) > LEAST_SHARE - 1e-9);
     }
     assert!((whole - taken - body.volume()).abs() < 1e-9 * whole);
     taken += body
