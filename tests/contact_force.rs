@@ -222,14 +222,7 @@ fn without_a_prior_it_is_the_elements_force_at_the_last_state() {
     let mut field = vec![0.0; 3 * scene.node_count()];
     scene.step(sparse(&contact), Some(&mut field)).unwrap();
     let (mesh, material) = (&model.mesh, &model.manifest.material);
-    let mut forces = ReactionForces::new(
-        &mesh.positions,
-        &mesh.tets,
-        &mesh.stiffness,
-        &contact.0,
-        material.moduli(),
-    )
-    .unwrap();
+    let mut forces = ReactionForces::new(mesh.tetrahedra(), &contact.0, material.moduli()).unwrap();
     let mut want = vec![0.0; contact.1.len()];
     forces.reaction(&field, &contact.0, &mut want).unwrap();
     assert!(want.iter().any(|f| f.abs() > 0.1));

@@ -11,15 +11,18 @@ mod tests;
 
 use crate::error::{Error, Result};
 use crate::memory;
-use elements::Tetrahedron;
+use elements::{Tetrahedra, Tetrahedron};
 
 pub use elements::Moduli;
 
 /// What is known of the elements around the nodes that can be in contact; made once a mesh.
 #[derive(Debug)]
 pub struct ReactionForces {
-    moduli: Moduli,
+    /// By number of a law, see [`elements::Laws`].
+    moduli: Vec<Moduli>,
     elements: Vec<Tetrahedron>,
+    /// Number of each element's law.
+    law: Vec<u8>,
     /// Rows of `around`, one a mesh node (empty for nodes that cannot be in contact).
     offsets: Vec<u32>,
     around: Vec<u32>,
@@ -49,31 +52,31 @@ const WHAT: &str = "the elements' forces";
 impl ReactionForces {
     /// Adjacency and gradients of the elements that touch `nodes` (the surface's, say).
     ///
-    /// `positions [K,3]` mm, `tets [T,4]` of positive volume, `stiffness [T]` their Young's moduli over the
-    /// material's or empty for a uniform body, `nodes` below `K`.
+    /// Tetrahedra of positive volume with checked laws, `nodes` below `K`, the material's moduli.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn new(
-        positions: &[f32],
-        tets: &[u32],
-        stiffness: &[f32],
-        nodes: &[u32],
-        moduli: Moduli,
-    ) -> Result<Self> {
-        let node_count = positions.len() / 3;
+    pub fn new(body: Tetrahedra<'_>, nodes: &[u32], moduli: Moduli) -> Result<Self> {
+        let node_count = body.positions.len();
         let mut wanted = memory::filled(node_count, false, WHAT)?;
         nodes.iter().for_each(|&node| wanted[node as usize] = true);
         let touched = || {
-            let all = tets.chunks_exact(4).enumerate();
+            let all = body.tets.iter().enumerate();
             all.filter(|(_, tet)| tet.iter().any(|&node| wanted[node as usize]))
         };
-        let elements = touched().map(|(index, tet)| {
-            let corners = [tet[0], tet[1], tet[2], tet[3]];
-            let factor = stiffness.get(index).map_or(1.0, |&f| f64::from(f));
-            Tetrahedron::new(corners, corners.map(|node| row_of(positions, node)), factor)
+        let elements = touched().map(|(index, &corners)| {
+            let rest = corners.map(|node| body.positions[node as usize].map(f64::from));
+            Tetrahedron::new(corners, rest, f64::from(body.stiffness_of(index)))
         });
         let elements = memory::collected(touched().count(), elements, WHAT)?;
+        let numbers = touched().map(|(index, _)| body.laws.number_of(index));
+        let law = memory::collected(elements.len(), numbers, WHAT)?;
+        let others = body.laws.regions.iter().map(|region| Moduli {
+            law: region.law,
+            ..moduli
+        });
+        let all = std::iter::once(moduli).chain(others);
+        let moduli = memory::collected(body.laws.regions.len() + 1, all, WHAT)?;
         let mut offsets = memory::filled(node_count + 1, 0u32, WHAT)?;
         let touches = || {
             elements.iter().enumerate().flat_map(|(e, element)| {
@@ -93,6 +96,7 @@ impl ReactionForces {
         }
         Ok(Self {
             moduli,
+            law,
             visited: memory::filled(elements.len(), 0, WHAT)?,
             elements,
             offsets,
@@ -192,7 +196,8 @@ impl ReactionForces {
                 let element = &self.elements[e as usize];
                 let state =
                     element.deformation(element.corners.map(|node| row_of(displacement, node)));
-                let (forces, det) = (element.forces(&state, self.moduli), state.det);
+                let moduli = self.moduli[usize::from(self.law[e as usize])];
+                let (forces, det) = (element.forces(&state, moduli), state.det);
                 if !det.is_finite() {
                     return Err(Error::NonFinite(format!(
                         "reaction: displacement around node {node} is not finite"

@@ -11,6 +11,15 @@ fn element(positions: &[f32], corners: [u32; 4]) -> Tetrahedron {
     Tetrahedron::new(corners, corners.map(|node| row_of(positions, node)), 1.0)
 }
 
+fn body<'a>(positions: &'a [f32], tets: &'a [u32]) -> Tetrahedra<'a> {
+    Tetrahedra {
+        positions: positions.as_chunks().0,
+        tets: tets.as_chunks().0,
+        stiffness: &[],
+        laws: elements::Laws::default(),
+    }
+}
+
 /// A cube of `n³` cells, five tetrahedra each, edge `n` mm.
 fn cube(n: u32) -> (Vec<f32>, Vec<u32>) {
     let node = |x: u32, y: u32, z: u32| x + (n + 1) * (y + (n + 1) * z);
@@ -85,7 +94,7 @@ fn wavy(positions: &[f32], size: f32) -> Vec<f32> {
 fn forces_are_the_derivative_of_the_energy() {
     let (positions, tets) = cube(3);
     let nodes: Vec<u32> = (0..positions.len() as u32 / 3).collect();
-    let mut forces = ReactionForces::new(&positions, &tets, &[], &nodes, UNIT).unwrap();
+    let mut forces = ReactionForces::new(body(&positions, &tets), &nodes, UNIT).unwrap();
     let mut u = wavy(&positions, 0.08);
     let mut out = vec![0.0; positions.len()];
     let report = forces.reaction(&u, &nodes, &mut out).unwrap();
@@ -120,7 +129,7 @@ fn a_stretched_bar_pulls_with_the_closed_form() {
     }
     let face: Vec<u32> = (0..27).filter(|i| i % 3 == 2).collect();
     let mut out = vec![0.0; 27];
-    let mut forces = ReactionForces::new(&positions, &tets, &[], &face, UNIT).unwrap();
+    let mut forces = ReactionForces::new(body(&positions, &tets), &face, UNIT).unwrap();
     forces.reaction(&u, &face, &mut out).unwrap();
     let (det, invariant) = (a * b * b, a * a + 2.0 * b * b);
     let stress = UNIT.shear_pa * det.powf(-2.0 / 3.0) * (a - invariant / (3.0 * a))
@@ -137,11 +146,11 @@ fn a_subset_gives_the_same_forces_and_rest_gives_none() {
     let some = [3, 0, 17, 60];
     let u = wavy(&positions, 0.1);
     let (mut whole, mut part) = (vec![0.0; 192], vec![0.0; 12]);
-    ReactionForces::new(&positions, &tets, &[], &all, UNIT)
+    ReactionForces::new(body(&positions, &tets), &all, UNIT)
         .unwrap()
         .reaction(&u, &all, &mut whole)
         .unwrap();
-    let mut forces = ReactionForces::new(&positions, &tets, &[], &some, UNIT).unwrap();
+    let mut forces = ReactionForces::new(body(&positions, &tets), &some, UNIT).unwrap();
     for _ in 0..3 {
         forces.reaction(&u, &some, &mut part).unwrap();
         for (entry, &node) in some.iter().enumerate() {
@@ -159,7 +168,7 @@ fn a_subset_gives_the_same_forces_and_rest_gives_none() {
 fn the_neighbourhood_is_what_the_forces_depend_on() {
     let (positions, tets) = cube(3);
     let nodes = [21, 63];
-    let mut forces = ReactionForces::new(&positions, &tets, &[], &nodes, UNIT).unwrap();
+    let mut forces = ReactionForces::new(body(&positions, &tets), &nodes, UNIT).unwrap();
     let mut around = Vec::new();
     forces.neighbourhood(&nodes, &mut around).unwrap();
     assert!(around.is_sorted() && around.contains(&21) && around.len() < 64);
@@ -180,7 +189,7 @@ fn the_neighbourhood_is_what_the_forces_depend_on() {
 #[test]
 fn wrong_input_is_an_error_and_the_next_call_works() {
     let (positions, tets) = cube(2);
-    let mut forces = ReactionForces::new(&positions, &tets, &[], &[0, 1, 2], UNIT).unwrap();
+    let mut forces = ReactionForces::new(body(&positions, &tets), &[0, 1, 2], UNIT).unwrap();
     let u = vec![0.0; 81];
     let mut out = [0.0; 6];
     assert!(matches!(

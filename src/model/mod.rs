@@ -145,6 +145,8 @@ impl Model {
         let mesh_file = files.tensors(&manifest.mesh.file)?;
         let mut mesh = Mesh::parse(&mesh_file, manifest.boundary)?;
         mesh.take_named(&manifest.supports, &manifest.regions)?;
+        mesh.check_laws(&manifest.mesh.file, &manifest.material)?;
+        mesh.check_named_laws(&manifest.laws)?;
         if mesh.node_count() != manifest.mesh.nodes {
             return Err(crate::error::Error::bundle(
                 "bundle.json",

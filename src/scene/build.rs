@@ -45,7 +45,9 @@ pub(super) fn build(
             }
             let bytes = crate::bundle::read_regular(path)?;
             let file = TensorFile::parse(&path.display().to_string(), bytes)?;
-            Some(Arc::new(Mesh::parse(&file, model.manifest.boundary)?))
+            let mesh = Mesh::parse(&file, model.manifest.boundary)?;
+            mesh.check_laws(file.name(), &model.manifest.material)?;
+            Some(Arc::new(mesh))
         }
     };
     let engine = match &model.kind {

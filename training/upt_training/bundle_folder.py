@@ -96,6 +96,7 @@ def requirements(manifest: dict) -> list[str]:
         "corrections": "corrections" in manifest,
         "gravity_at_rest": "gravity_at_rest_m_s2" in manifest,
         "law": "law" in manifest.get("material", {}),
+        "laws": bool(manifest.get("laws")),
         "relaxation": "relaxation" in manifest.get("material", {}),
         "release": "release" in manifest.get("prior", {}),
         "unlearned": manifest.get("kind") == "reduced" and "reduced" not in manifest,

@@ -2,12 +2,14 @@
 
 `positions` are rest positions in mm, `[K, 3]` float32; `tets` `[T, 4]` int32; `surface` `[F, 3]` int32, outward;
 `domain` `[D]` rows of `surface` that instruments may touch; `fixed` and `supported` are ascending node sets;
-`stiffness` `[T]` float32 is Young's modulus of each tetrahedron over the material's, empty for a uniform body.
+`stiffness` `[T]` float32 is Young's modulus of each tetrahedron over the material's, empty for a uniform body;
+`region` `[T]` int32 is 0 or one more than the place of the tetrahedron's region in the metadata's list `laws`.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -30,6 +32,7 @@ class Mesh:
     supported: np.ndarray
     metadata: dict = field(default_factory=dict)
     stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
+    region: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
 
     @property
     def node_count(self) -> int:
@@ -37,10 +40,13 @@ class Mesh:
 
     @property
     def sha256(self) -> str:
-        """The mesh hash: SHA-256 of the bytes of positions, tets, fixed, supported and, if any, stiffness."""
+        """The mesh hash: SHA-256 of the bytes of positions, tets, fixed, supported and, if any, stiffness, region and laws."""
         digest = hashlib.sha256()
         for array in (self.positions, self.tets, self.fixed, self.supported, self.stiffness):
             digest.update(np.ascontiguousarray(array).tobytes())
+        if len(self.region):
+            digest.update(np.ascontiguousarray(self.region).tobytes())
+            digest.update(self.metadata.get("laws", "").encode())
         return digest.hexdigest()
 
     @property
@@ -77,6 +83,8 @@ class Mesh:
         }
         if len(self.stiffness):
             tensors["stiffness"] = np.ascontiguousarray(self.stiffness, np.float32)
+        if len(self.region):
+            tensors["region"] = np.ascontiguousarray(self.region, np.int32)
         save_file(tensors, str(path), metadata={k: str(v) for k, v in metadata.items()})
         Path(path).chmod(0o644)
 
@@ -96,14 +104,18 @@ def load_mesh(path: Path | str) -> Mesh:
             empty = np.zeros(0, np.int32)
             get = {n: file.get_tensor(n) if n in names else empty for n in _TENSORS}
             stiffness = file.get_tensor("stiffness") if "stiffness" in names else np.zeros(0, np.float32)
+            region = file.get_tensor("region") if "region" in names else empty
     except SafetensorError as error:
         raise InputError(f"{path}: not a readable safetensors file ({error}); make the mesh again") from error
-    mesh = Mesh(**get, stiffness=stiffness, metadata=metadata)
+    mesh = Mesh(**get, stiffness=stiffness, region=region, metadata=metadata)
     if not np.isfinite(mesh.positions).all():
         node = int(np.argwhere(~np.isfinite(mesh.positions))[0, 0])
         raise InputError(f"{path}: positions of node {node} are not finite")
     if len(stiffness) and (len(stiffness) != len(mesh.tets) or not (np.isfinite(stiffness) & (stiffness > 0)).all()):
         raise InputError(f"{path}: stiffness must hold a finite positive number for each of the {len(mesh.tets)} tets")
+    laws = json.loads(metadata.get("laws", "[]"))
+    if len(region) and (len(region) != len(mesh.tets) or region.min() < 0 or region.max() > len(laws)):
+        raise InputError(f"{path}: region must hold 0 to {len(laws)}, the number of laws, for each of the {len(mesh.tets)} tets")
     for name in ("tets", "surface", "fixed", "supported"):
         array = getattr(mesh, name)
         if array.size and (array.min() < 0 or array.max() >= mesh.node_count):

@@ -46,6 +46,7 @@ impl Mesh {
         let most = self.tets.len() / 4 + new.len();
         let mut tets = memory::room(4 * most, WHAT)?;
         let mut stiffness = memory::room(most, WHAT)?;
+        let mut region = memory::room(most, WHAT)?;
         let ends = gone.iter().map(|element| *element as usize);
         let mut start = 0;
         for end in ends.chain([self.tets.len() / 4]) {
@@ -54,11 +55,13 @@ impl Mesh {
                 true => stiffness.resize(stiffness.len() + end - start, 1.0),
                 false => stiffness.extend_from_slice(&self.stiffness[start..end]),
             }
+            region.extend(self.region.iter().take(end).skip(start));
             start = end + 1;
         }
         for element in new {
             tets.extend(element.nodes);
             stiffness.push(self.stiffness_of(element));
+            region.extend(self.region.get(element.parent as usize));
         }
         let faces = body.touchable_of(self.domain_sides(body)?)?;
         let domain_faces = memory::copied(faces.as_flattened(), WHAT)?;
@@ -91,6 +94,8 @@ impl Mesh {
             positions,
             tets,
             stiffness,
+            region,
+            laws: memory::collected(self.laws.len(), self.laws.iter().cloned(), WHAT)?,
             surface_faces: memory::copied(&self.surface_faces, WHAT)?,
             domain_nodes: unique(memory::copied(&domain_faces, WHAT)?),
             domain_faces,

@@ -7,6 +7,7 @@ mod cut_mesh;
 mod faults;
 mod files;
 mod known;
+mod laws;
 pub mod limits;
 mod maker;
 mod manifest;

@@ -336,6 +336,9 @@ pub struct Manifest {
     /// Named parts of the surface, which may overlap.
     #[serde(default)]
     pub regions: Vec<NodeSet>,
+    /// Regions with a law of their own, as the mesh has them.
+    #[serde(default)]
+    pub laws: Vec<elements::Region>,
     /// Gravity under which the mesh was scanned, m/s², where a step's input gives none; absent: zero.
     #[serde(default)]
     pub gravity_at_rest_m_s2: [f32; 3],

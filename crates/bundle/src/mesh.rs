@@ -25,6 +25,10 @@ pub struct Mesh {
     pub tets: Vec<u32>,
     /// Young's modulus of each tetrahedron over the material's `[T]`; empty where the body is uniform.
     pub stiffness: Vec<f32>,
+    /// Number of each tetrahedron's law `[T]`, see [`elements::Laws`]; empty where the body has the material's.
+    pub region: Vec<u8>,
+    /// Regions with a law of their own.
+    pub laws: Vec<elements::Region>,
     /// Boundary triangles `[F,3]`, outward.
     pub surface_faces: Vec<u32>,
     /// Triangles of the domain `[D,3]`.
@@ -86,6 +90,7 @@ impl Mesh {
             let problem = format!("element {tet} is {}, must be positive", stiffness[tet]);
             return Err(file.bad("stiffness", problem));
         }
+        let (region, laws) = super::laws::read(file, tets.len() / 4)?;
         let surface_faces = file.indices("surface", &[None, Some(3)], count)?;
         let domain = if file.has("domain") {
             file.indices("domain", &[None], surface_faces.len() / 3)?
@@ -118,6 +123,10 @@ impl Mesh {
         if file.has("stiffness") {
             hash.update(file.raw("stiffness", Dtype::F32, &[None])?);
         }
+        if file.has("region") {
+            hash.update(file.raw("region", Dtype::I32, &[None])?);
+            hash.update(text.get("laws").map_or("", String::as_str));
+        }
         let mut held_nodes = fixed;
         if boundary == Boundary::Supported {
             memory::reserve(&mut held_nodes, supported.len(), WHAT)?;
@@ -131,6 +140,8 @@ impl Mesh {
             positions,
             tets,
             stiffness,
+            region,
+            laws,
             surface_faces,
             domain_faces,
             sha256: hex(&hash.finalize()),
@@ -138,6 +149,19 @@ impl Mesh {
             supports: Vec::new(),
             regions: Vec::new(),
         })
+    }
+
+    /// What the element law needs.
+    pub fn tetrahedra(&self) -> elements::Tetrahedra<'_> {
+        elements::Tetrahedra {
+            positions: self.positions.as_chunks().0,
+            tets: self.tets.as_chunks().0,
+            stiffness: &self.stiffness,
+            laws: elements::Laws {
+                of_tet: &self.region,
+                regions: &self.laws,
+            },
+        }
     }
 
     /// Takes the support groups and the regions of the bundle that it is of.

@@ -25,14 +25,7 @@ fn reaction_equals_the_reference_solvers() {
     let options = SolverOptions::default();
     let material = options.material;
     let mut solver = Solver::new(&mesh, Boundary::Fixed, options).unwrap();
-    let mut forces = ReactionForces::new(
-        mesh.positions.as_flattened(),
-        mesh.tets.as_flattened(),
-        &mesh.stiffness,
-        &nodes,
-        material.moduli(),
-    )
-    .unwrap();
+    let mut forces = ReactionForces::new(mesh.tetrahedra(), &nodes, material.moduli()).unwrap();
     let mut displacement = vec![[0.0; 3]; mesh.node_count()];
     let mut reaction = vec![0.0; 3 * nodes.len()];
     for frame in 1..=6 {

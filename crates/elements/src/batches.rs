@@ -17,7 +17,7 @@ pub const PADDING: u32 = u32::MAX;
 #[derive(Default)]
 pub struct Kind<const NODES: usize, const TETS: usize> {
     pub batches: Vec<Cluster<NODES, TETS>>,
-    /// A row a batch where the law takes displacements or the material relaxes, else none.
+    /// A row a batch where a law of the body takes displacements or the material relaxes, else none.
     pub gradients: Vec<Gradients<TETS>>,
     /// Mesh elements of each batch; [`PADDING`] in padding lanes.
     pub elements: Vec<[[u32; WIDTH]; TETS]>,
@@ -40,6 +40,8 @@ pub struct Source<'a> {
     pub rest: &'a [[f32; 4]],
     pub mesh: Tetrahedra<'a>,
     pub material: &'a Material,
+    /// Whether gradients are asked for.
+    pub gradients: bool,
 }
 
 impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
@@ -57,9 +59,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         let (groups, ends) = disjoint_batches(groups)?;
         self.batches.try_reserve(ends.len())?;
         self.elements.try_reserve(ends.len())?;
-        let relaxes = !source.material.relaxation.is_empty();
-        let displacements = relaxes || source.material.law.takes_displacements();
-        if displacements {
+        if source.gradients {
             self.gradients.try_reserve(ends.len())?;
         }
         let starts = std::iter::once(0).chain(ends.iter().copied());
@@ -99,7 +99,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                 }
             }
             self.batches.push(batch);
-            if displacements {
+            if source.gradients {
                 self.gradients.push(gradients);
             }
             self.elements.push(elements);

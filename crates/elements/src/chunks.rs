@@ -1,12 +1,18 @@
 //! The chunks of a body one by one, for what is summed over them.
 
 use crate::internal_forces::{ElementForces, Scratch};
+use crate::material::Moduli;
 use crate::tetrahedron::Tetrahedron;
 
 impl ElementForces {
     /// Chunks of the body; each element is in one of them.
     pub fn chunk_count(&self) -> usize {
         self.partition.chunks.len()
+    }
+
+    /// The material's moduli with the law of a chunk.
+    pub fn moduli_of(&self, chunk: usize) -> Moduli {
+        self.partition.moduli_of(&self.partition.chunks[chunk])
     }
 
     /// Mesh nodes of a chunk's elements, each once.

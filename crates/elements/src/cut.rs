@@ -8,6 +8,7 @@ use crate::batches::{Kind, PADDING};
 use crate::internal_forces::ElementForces;
 use crate::material::Material;
 use crate::partition::{CHUNK_ELEMENTS, Chunk, Partition};
+use crate::regions::Laws;
 use crate::room::{collected, filled, push, room};
 use crate::tetrahedra::Tetrahedra;
 use lanes::WIDTH;
@@ -99,8 +100,9 @@ impl ElementForces {
             push(&mut packed[chunk_of[place as usize]], own)?;
         }
         for (at, own) in packed.iter().enumerate() {
+            let law = partition.chunks[at].law;
             for own in own.chunks(CHUNK_ELEMENTS) {
-                partition.push_packed(own, cut.positions, material)?;
+                partition.push_packed((own, law), cut.positions, material)?;
                 push(&mut parents, at as u32)?;
             }
         }
@@ -124,7 +126,7 @@ impl Partition {
                 ..*chunk
             });
         }
-        let mut copy = Partition::empty(self.moduli);
+        let mut copy = Partition::empty_of(self)?;
         copy.relaxation = self.relaxation;
         copy.chunks = chunks;
         copy.octahedra = self.octahedra.copied()?;
@@ -136,10 +138,10 @@ impl Partition {
         Ok(copy)
     }
 
-    /// A chunk of elements behind the others. It owns the nodes that have no owner yet.
+    /// A chunk of elements of a law behind the others. It owns the nodes that have no owner yet.
     fn push_packed(
         &mut self,
-        elements: &[Packed],
+        (elements, law): (&[Packed], u8),
         positions: &[[f32; 3]],
         material: &Material,
     ) -> Result<(), TryReserveError> {
@@ -154,9 +156,10 @@ impl Partition {
             positions,
             tets: &tets,
             stiffness: &stiffness,
+            laws: Laws::default(),
         };
         self.push_chunk(
-            &leaf,
+            (&leaf, law),
             |node| fresh.binary_search(&node).is_ok(),
             mesh,
             material,

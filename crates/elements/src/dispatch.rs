@@ -43,7 +43,7 @@ unsafe fn all_forces<L: Eigenvalues, const AVERAGED: bool>(
     forces: *mut [f32; 4],
 ) -> f32 {
     unsafe {
-        match partition.moduli.law {
+        match partition.moduli_of(chunk).law {
             Law::NeoHookean(law) => {
                 forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
             }
@@ -86,7 +86,7 @@ unsafe fn forces_by_stretches<L: Eigenvalues, const AVERAGED: bool>(
     forces: *mut [f32; 4],
 ) -> f32 {
     unsafe {
-        let moduli = partition.moduli;
+        let moduli = partition.moduli_of(chunk);
         let law = &LaneTerms::new(&moduli.law, [moduli.shear_pa, moduli.bulk_pa]);
         let (octahedra, pairs, singles) = partition.clusters(chunk);
         let (of_octahedra, of_pairs, of_singles) = partition.gradients(chunk);
@@ -109,7 +109,7 @@ unsafe fn all_volumes<L: NodeLanes>(
 ) {
     unsafe {
         let (octahedra, pairs, singles) = partition.clusters(chunk);
-        if partition.moduli.law.takes_displacements() {
+        if partition.moduli_of(chunk).law.takes_displacements() {
             let bulk = partition.moduli.bulk_pa as f32;
             let (of_octahedra, of_pairs, of_singles) = partition.gradients(chunk);
             add_volumes_of_stretches::<L, 6, 4>(bulk, (octahedra, of_octahedra), nodes, forces);
@@ -134,7 +134,7 @@ unsafe fn all_histories<L: Eigenvalues>(
     forces: [*mut [f32; 4]; 2],
 ) {
     unsafe {
-        let moduli = partition.moduli;
+        let moduli = partition.moduli_of(chunk);
         let shear = moduli.shear_pa * step.stiffer;
         let law = &LaneTerms::new(&moduli.law, [shear, moduli.bulk_pa]);
         let (octahedra, pairs, singles) = partition.clusters(chunk);

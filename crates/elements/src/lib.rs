@@ -12,6 +12,7 @@
 )]
 
 mod batches;
+mod bisection;
 mod chunks;
 mod cluster;
 mod cut;
@@ -25,6 +26,7 @@ mod laws;
 mod material;
 mod partition;
 mod principal;
+mod regions;
 mod relaxation;
 mod room;
 mod slots;
@@ -49,6 +51,7 @@ pub use laws::{
 };
 pub use material::{Material, Moduli};
 pub use partition::{Chunk, Partition};
+pub use regions::{Laws, MOST_REGIONS, Region};
 pub use relaxation::{Branch, MOST_BRANCHES, Relaxation};
 pub use slots::{FLOPS_PER_NODE, PADDED};
 pub use stress_step::StressStep;

@@ -8,8 +8,10 @@
 //! alone: a result has the same bits for any number of threads.
 
 use crate::batches::{Element, Kind, PADDING, Source};
+use crate::bisection::bisect;
 use crate::cluster::{Groups, Octahedra, Pairs, Singles};
 use crate::gradients::Gradients;
+use crate::laws::Law;
 use crate::material::{Material, Moduli};
 use crate::relaxation::Relaxation;
 use crate::room::{collected, filled, room};
@@ -32,6 +34,8 @@ pub struct Chunk {
     pub ghosts: Vec<u32>,
     /// `(own slot, ghost slot elsewhere)` whose force is added here, ascending.
     pub contributions: Vec<(u32, u32)>,
+    /// Number of the law that all its elements have, see [`crate::Laws`].
+    pub law: u8,
     /// This chunk's part of [`Partition::octahedra`].
     pub octahedra: Range<usize>,
     /// This chunk's part of [`Partition::pairs`].
@@ -64,6 +68,8 @@ pub struct Partition {
     zeros: Vec<[f32; 4]>,
     /// The material's.
     pub moduli: Moduli,
+    /// Of the body's regions.
+    pub laws: Vec<Law>,
     /// The material's.
     pub relaxation: Relaxation,
 }
@@ -91,9 +97,19 @@ impl Partition {
             [0, 1, 2].map(|k| tet.iter().map(|n| positions[*n as usize][k]).sum::<f32>())
         }))?;
         let mut order = collected(0..tets.len() as u32)?;
-        let count = tets.len().div_ceil(elements);
-        let mut sizes = room(count.max(1))?;
-        bisect(&mut order, &centroids, count, &mut sizes);
+        // A chunk has one law: those of a law are split on their own.
+        if !mesh.laws.of_tet.is_empty() {
+            order
+                .sort_unstable_by_key(|element| (mesh.laws.number_of(*element as usize), *element));
+        }
+        let law_of = |element: &u32| mesh.laws.number_of(*element as usize);
+        let mut sizes = room(tets.len().div_ceil(elements) + mesh.laws.regions.len() + 1)?;
+        for same in order.chunk_by_mut(|a, b| law_of(a) == law_of(b)) {
+            bisect(same, &centroids, same.len().div_ceil(elements), &mut sizes);
+        }
+        if sizes.is_empty() {
+            sizes.push(0);
+        }
         let leaves = || {
             let mut rest = order.as_slice();
             sizes.iter().map(move |size| {
@@ -121,11 +137,13 @@ impl Partition {
             rest: Vec::new(),
             zeros: Vec::new(),
             moduli: material.moduli(),
+            laws: collected(mesh.laws.regions.iter().map(|region| region.law))?,
             relaxation: material.relaxation,
         };
         for (chunk, leaf) in leaves().enumerate() {
             let is_own = |node: u32| owner[node as usize] == chunk as u32;
-            partition.push_chunk(leaf, is_own, mesh, material)?;
+            let law = leaf.first().map_or(0, law_of);
+            partition.push_chunk((leaf, law), is_own, mesh, material)?;
         }
         partition.connect_from(0)?;
         partition.fit_zeros()?;
@@ -138,19 +156,53 @@ impl Partition {
         widest.unwrap_or(0).next_multiple_of(PADDED)
     }
 
-    /// Makes the zeros as long as the widest chunk, where the law takes displacements.
+    /// The law of a number.
+    #[inline(always)]
+    fn law(&self, number: u8) -> &Law {
+        match usize::from(number).checked_sub(1) {
+            None => &self.moduli.law,
+            Some(at) => &self.laws[at],
+        }
+    }
+
+    /// The material's moduli with the law of a chunk.
+    #[inline(always)]
+    pub fn moduli_of(&self, chunk: &Chunk) -> Moduli {
+        Moduli {
+            law: *self.law(chunk.law),
+            ..self.moduli
+        }
+    }
+
+    /// Whether any law takes displacements.
+    #[inline(always)]
+    fn takes_displacements(&self) -> bool {
+        self.moduli.law.takes_displacements()
+            || self.laws.iter().any(|law| law.takes_displacements())
+    }
+
+    /// Whether batches have gradients.
+    #[inline(always)]
+    fn has_gradients(&self) -> bool {
+        self.takes_displacements() || !self.relaxation.is_empty()
+    }
+
+    /// Makes the zeros as long as the widest chunk, where a law takes displacements.
     pub fn fit_zeros(&mut self) -> Result<(), TryReserveError> {
         let widest = self.widest();
-        if self.moduli.law.takes_displacements() && self.zeros.len() < widest {
+        if self.takes_displacements() && self.zeros.len() < widest {
             self.zeros.try_reserve(widest - self.zeros.len())?;
             self.zeros.resize(widest, [0.0; 4]);
         }
         Ok(())
     }
 
-    /// Without any element, for a law.
-    pub fn empty(moduli: Moduli) -> Self {
-        Self {
+    /// Without any element, for the laws of a body.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn empty_of(body: &Self) -> Result<Self, TryReserveError> {
+        Ok(Self {
             chunks: Vec::new(),
             octahedra: Kind::default(),
             pairs: Kind::default(),
@@ -159,15 +211,16 @@ impl Partition {
             slot_of_node: Vec::new(),
             rest: Vec::new(),
             zeros: Vec::new(),
-            moduli,
+            moduli: body.moduli,
+            laws: collected(body.laws.iter().copied())?,
             relaxation: Relaxation::default(),
-        }
+        })
     }
 
-    /// A chunk of some elements behind the others; `is_own` says whether it owns a node.
+    /// A chunk of some elements of a law behind the others; `is_own` says whether it owns a node.
     pub(crate) fn push_chunk(
         &mut self,
-        leaf: &[u32],
+        (leaf, law): (&[u32], u8),
         is_own: impl Fn(u32) -> bool,
         mesh: Tetrahedra<'_>,
         material: &Material,
@@ -205,10 +258,12 @@ impl Partition {
             rest: &rest,
             mesh,
             material,
+            gradients: self.has_gradients(),
         };
         self.chunks.push(Chunk {
             first,
             owned: own.len(),
+            law,
             octahedra: self.octahedra.push(&groups.octahedra, source, local)?,
             pairs: self.pairs.push(&groups.pairs, source, local)?,
             singles: self.singles.push(&groups.singles, source, local)?,
@@ -231,10 +286,10 @@ impl Partition {
         )
     }
 
-    /// The gradients of a chunk's batches; empty where the law takes positions and the material does not relax.
+    /// The gradients of a chunk's batches; empty where all laws take positions and the material does not relax.
     #[inline(always)]
     pub fn gradients(&self, chunk: &Chunk) -> (&[Gradients<4>], &[Gradients<2>], &[Gradients<1>]) {
-        if !self.moduli.law.takes_displacements() && self.relaxation.is_empty() {
+        if !self.has_gradients() {
             return (&[], &[], &[]);
         }
         (
@@ -247,10 +302,10 @@ impl Partition {
     /// What the displacements of a chunk's slots are added to before the kernel reads them: rest positions, or zeros for a law that
     /// takes displacements.
     pub fn base(&self, chunk: &Chunk) -> &[[f32; 4]] {
-        if self.zeros.is_empty() {
-            &self.rest[chunk.first..chunk.first + chunk.slot_count()]
-        } else {
+        if self.law(chunk.law).takes_displacements() {
             &self.zeros[..chunk.slot_count()]
+        } else {
+            &self.rest[chunk.first..chunk.first + chunk.slot_count()]
         }
     }
 
@@ -330,29 +385,4 @@ pub fn from_centre(
         let [x, y, z] = [0, 1, 2].map(|k| (f64::from(p[k]) - centre[k]) as f32);
         [x, y, z, 0.0]
     })
-}
-
-/// Splits `order` into `count` spatially compact leaves of nearly equal size, one after another; `sizes` has room for theirs.
-fn bisect(order: &mut [u32], centroids: &[[f32; 3]], count: usize, sizes: &mut Vec<usize>) {
-    if count <= 1 {
-        sizes.push(order.len());
-        return;
-    }
-    let extent = |axis: usize| {
-        let values = order.iter().map(|e| centroids[*e as usize][axis]);
-        values.clone().fold(f32::MIN, f32::max) - values.fold(f32::MAX, f32::min)
-    };
-    let spans = [0, 1, 2].map(extent);
-    let axis = (0..3)
-        .max_by(|a, b| spans[*a].total_cmp(&spans[*b]))
-        .unwrap_or(0);
-    order.sort_unstable_by(|a, b| {
-        centroids[*a as usize][axis]
-            .total_cmp(&centroids[*b as usize][axis])
-            .then(a.cmp(b))
-    });
-    let half = count / 2;
-    let (left, right) = order.split_at_mut(order.len() * half / count);
-    bisect(left, centroids, half, sizes);
-    bisect(right, centroids, count - half, sizes);
 }

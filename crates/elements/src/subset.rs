@@ -24,6 +24,8 @@ pub struct Subset {
     used: [usize; 3],
     /// Where the piece being filled starts: its slots, and its batches of each kind.
     starts: [usize; 4],
+    /// The law of the piece being filled.
+    law: u8,
     positions: Vec<Line>,
     forces: Vec<Line>,
 }
@@ -48,7 +50,7 @@ impl Subset {
     /// No memory.
     pub fn new(body: &ElementForces) -> Result<Subset, TryReserveError> {
         Ok(Subset {
-            partition: Partition::empty(body.partition.moduli),
+            partition: Partition::empty_of(&body.partition)?,
             kernels: body.kernels,
             slots: Slots {
                 of_node: filled(body.node_count(), PADDING)?,
@@ -56,6 +58,7 @@ impl Subset {
             },
             used: [WIDTH; 3],
             starts: [0; 4],
+            law: 0,
             positions: Vec::new(),
             forces: Vec::new(),
         })
@@ -89,9 +92,11 @@ impl Subset {
     ) -> Result<f64, TryReserveError> {
         let from = &body.partition;
         let chunk = &from.chunks[chunk];
-        if self.partition.node_of_slot.len() - self.starts[0] + chunk.slot_count() > MOST_SLOTS {
+        let slots = self.partition.node_of_slot.len() - self.starts[0];
+        if slots + chunk.slot_count() > MOST_SLOTS || self.law != chunk.law {
             self.end_piece()?;
         }
+        self.law = chunk.law;
         let source = Source {
             nodes: &from.node_of_slot[chunk.first..],
             is_wanted,
@@ -158,6 +163,7 @@ impl Subset {
         let piece = Chunk {
             first,
             owned,
+            law: self.law,
             ghosts: Vec::new(),
             contributions: Vec::new(),
             octahedra: octahedra..ends[0],

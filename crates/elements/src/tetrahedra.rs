@@ -1,6 +1,8 @@
 //! What the element law needs of a mesh.
 
-/// Rest positions, corners and relative stiffness of the tetrahedra of a body.
+use crate::regions::Laws;
+
+/// Rest positions, corners, relative stiffness and laws of the tetrahedra of a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Tetrahedra<'a> {
     /// `[K,3]`, mm.
@@ -9,6 +11,8 @@ pub struct Tetrahedra<'a> {
     pub tets: &'a [[u32; 4]],
     /// `[T]` Young's modulus over the material's; empty where the body is uniform.
     pub stiffness: &'a [f32],
+    /// Which have a law of their own.
+    pub laws: Laws<'a>,
 }
 
 impl Tetrahedra<'_> {

@@ -117,7 +117,7 @@ impl Certificate {
             "machine": serde_json::to_value(Machine::this()).unwrap_or_default(),
             "envelope": {
                 "max_push_mm": stated.envelope.max_push_mm, "contact_area_mm2": stated.envelope.contact_area_mm2,
-                "material": stated.material,
+                "material": stated.material, "laws": stated.laws,
             },
         });
         let steps = contact.steps.max(1) as f64;

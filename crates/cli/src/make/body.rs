@@ -10,6 +10,7 @@ use tissue::mesh_import::{
 use tissue::mesh_quality::measure;
 
 use super::fixed;
+use super::laws;
 use super::options::Options;
 use super::stages::Stage;
 use super::unload::unload;
@@ -78,6 +79,7 @@ pub fn make(options: &Options, stage: &mut Stage) -> Result<()> {
             rows.len()
         ));
     }
+    laws::apply(&mut mesh, options, (&input, scale), stage)?;
     choose_domain(&mut mesh, options, &open(&options.domain)?, stage)?;
     let inside: Vec<Vec<u32>> = (options.pressure.iter())
         .map(|own| Ok(nodes_in(&mesh, &[own.region.open(&input, scale)?])))

@@ -83,6 +83,9 @@ pub fn assemble(
     if !material.relaxation.is_empty() {
         requires.insert(0, "relaxation");
     }
+    if !mesh.regions.is_empty() {
+        requires.insert(0, "laws");
+    }
     let gravity = unload::at_rest(options);
     if gravity.is_some() {
         requires.insert(0, "gravity_at_rest");
@@ -127,6 +130,7 @@ pub fn assemble(
         ),
         ("supports", json!(fixed::read(work, fixed::SUPPORTS)?)),
         ("regions", json!(fixed::read(work, fixed::REGIONS)?)),
+        ("laws", json!(mesh.regions)),
         ("gravity_at_rest_m_s2", json!(gravity.unwrap_or_default())),
         (
             "provenance",
@@ -138,7 +142,7 @@ pub fn assemble(
     ];
     // A bundle without these is one that libraries before them read.
     let is_told = |(name, value): &&(&str, Value)| match *name {
-        "supports" | "regions" => *value != json!([]),
+        "supports" | "regions" | "laws" => *value != json!([]),
         "gravity_at_rest_m_s2" => gravity.is_some(),
         _ => true,
     };

@@ -16,6 +16,7 @@ mod clock;
 mod emit;
 mod fixed;
 mod gravity;
+mod laws;
 mod learn;
 mod options;
 mod patches;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::fixed::Fixed;
 use super::gravity::{Gravity, gravity};
+use super::laws::{self, Choice};
 use anyhow::{Result, bail};
 use clap::Args;
 use elements::{Law, Material, Relaxation};
@@ -26,6 +27,7 @@ const DRAFT: u32 = 5;
   upt make kidney.stl --out kidney --fixed ball:0,0,12,9 --domain ball:30,0,0,25 --minutes 3
   upt make heart.vtu --out heart --fixed inside:pericardium.stl --young 15000 --nodes 8000
   upt make liver.obj --out liver --support bed=plane:0,0,-1,-20 --support ligament=ball:40,0,20,8 --gravity 0,-9.81,0 --unload
+  upt make head.vtu --out head --fixed group:skull --law corona-radiata --material grey=cortex --material nuclei=basal-ganglia
   upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --preview
   upt make liver.obj --out liver --fixed plane:0,0,-1,-20 --emit slurm jobs")]
 pub struct Options {
@@ -89,9 +91,14 @@ pub struct Options {
     pub tools: Option<String>,
     #[command(flatten)]
     pub sizes: tool_scale::Arguments,
-    /// Material that sets Young's modulus, density and damping: brain, liver, kidney, heart or fat.
-    #[arg(long, default_value = "brain")]
-    pub material: String,
+    /// Material that sets Young's modulus, density and damping: brain (if none is given), liver, kidney, heart or fat. With REGION= before it, a law as of
+    /// --law that a region has: one that --region or the mesh file names, or else a group of the input. May be repeated; where regions overlap, the
+    /// last one counts. All have the same Poisson's ratio, density, damping and relaxation.
+    #[arg(long, value_name = "NAME|REGION=LAW", allow_hyphen_values = true)]
+    pub material: Vec<Choice>,
+    /// Region that --material gives a law: a name, `=` and a region as of --fixed. May be repeated; regions of one name are one.
+    #[arg(long, value_name = "NAME=REGION", allow_hyphen_values = true)]
+    pub region: Vec<Fixed>,
     /// Young's modulus, Pa; overrides the material's. A law with a modulus of its own sets it.
     #[arg(long)]
     pub young: Option<f64>,
@@ -160,6 +167,10 @@ pub struct Options {
     pub json: bool,
 }
 
+fn texts<T: ToString>(list: &[T]) -> Vec<String> {
+    list.iter().map(T::to_string).collect()
+}
+
 /// `REGION=FACTOR`; a region may hold an equals sign itself.
 fn stiffer(text: &str) -> Result<(Region, f32), String> {
     let (region, factor) = text
@@ -222,10 +233,21 @@ impl Options {
 
     /// The tissue.
     pub fn material(&self) -> Result<Material> {
-        let Some([young, density, damping]) = named(&self.material) else {
+        let names = self.material.iter().filter_map(|choice| match choice {
+            Choice::Numbers(name) => Some(name.as_str()),
+            Choice::Law(..) => None,
+        });
+        let names: Vec<&str> = names.collect();
+        if names.len() > 1 {
             bail!(
-                "--material is `{}`; use brain, liver, kidney, heart or fat; --young, --density and --damping describe any other material",
-                self.material
+                "--material gives the body {}; give one, and --material REGION=LAW for regions",
+                names.join(" and ")
+            );
+        }
+        let name = names.first().copied().unwrap_or("brain");
+        let Some([young, density, damping]) = named(name) else {
+            bail!(
+                "--material is `{name}`; use brain, liver, kidney, heart or fat, or REGION=LAW; --young, --density and --damping describe any other material"
             );
         };
         let own = Material {
@@ -264,10 +286,22 @@ impl Options {
         let more = (&self.label, self.refill, self.boundary.as_str());
         let sets = (&self.stiffness, &self.fixed, &self.pressure);
         let mut words = format!("{} {mesh:?} {more:?} {sets:?}", self.scale()?);
+        if self
+            .material
+            .iter()
+            .any(|choice| matches!(choice, Choice::Law(..)))
+        {
+            words += &format!(
+                " {:?} {:?} {:?}",
+                self.material,
+                self.region,
+                self.material()?
+            );
+        }
         if let (Some(Gravity(own)), true) = (self.gravity, self.unload) {
             words += &format!(" free of {own:?} {:?}", self.material()?);
         }
-        let named = self.fixed.iter().chain(&self.pressure);
+        let named = self.fixed.iter().chain(&self.pressure).chain(&self.region);
         let held = named.map(|named| &named.region);
         let regions = held.chain([&Region::All]).chain(&self.domain);
         for region in regions.chain(self.stiffness.iter().map(|(region, _)| region)) {
@@ -285,14 +319,12 @@ impl Options {
 
     /// For the provenance.
     pub fn words(&self) -> Value {
-        let list =
-            |regions: &[Region]| -> Vec<String> { regions.iter().map(Region::to_string).collect() };
         json!({
             "unit": self.unit, "stiffness": self.stiffness.iter().map(|(region, factor)| format!("{region}={factor}")).collect::<Vec<String>>(),
-            "boundary": self.boundary.as_str(), "fixed": self.fixed.iter().map(Fixed::to_string).collect::<Vec<String>>(),
-            "pressure": self.pressure.iter().map(Fixed::to_string).collect::<Vec<String>>(), "domain": list(&self.domain), "nodes": self.nodes, "gravity": self.gravity.map(|own| own.0), "unload": self.unload,
+            "boundary": self.boundary.as_str(), "fixed": texts(&self.fixed),
+            "pressure": texts(&self.pressure), "domain": texts(&self.domain), "nodes": self.nodes, "gravity": self.gravity.map(|own| own.0), "unload": self.unload,
             "part": self.part, "label": self.label, "refill": self.refill,
-            "material": self.material, "relaxation": self.relaxation.to_string(), "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
+            "material": texts(&self.material), "region": texts(&self.region), "law": laws::words(&self.law), "relaxation": self.relaxation.to_string(), "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,
         })
     }

@@ -66,6 +66,15 @@ pub fn relaxation(text: &str) -> Result<Relaxation, String> {
     }
 }
 
+/// Where a tissue's law comes from; empty for a law that is no tissue's.
+pub fn source_of(law: &Law) -> String {
+    let own = law.to_string();
+    let found = tissues().into_iter().find(|tissue| tissue.law == own);
+    found.map_or_else(String::new, |tissue| {
+        format!("{} ({})", tissue.doi, tissue.tissue)
+    })
+}
+
 /// A law by its formula or by the name of a tissue; what clap calls for `--law`.
 pub fn law(text: &str) -> Result<Law, String> {
     match tissues().into_iter().find(|tissue| tissue.name == text) {

@@ -50,7 +50,7 @@ macro_rules! told {
     )*};
 }
 
-told!(elements::StressHistory: bytes);
+told!(elements::StressHistory: bytes, elements::Region: bytes);
 told!(Search: memory_bytes, Sweeps: memory_bytes);
 told!(elements::ElementForces: bytes, elements::Scratch: bytes, elements::Subset: bytes);
 

@@ -1,6 +1,6 @@
 //! The body that the corrections move: element forces and lumped mass.
 
-use elements::{ElementForces, Material, Tetrahedra};
+use elements::{ElementForces, Material};
 
 use super::boundary::Held;
 use super::time_step::Diagonal;
@@ -30,12 +30,8 @@ impl Body {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn new(mesh: &Mesh, material: &Material, diagonal: &Diagonal, isa: Isa) -> Result<Body> {
-        let body = Tetrahedra {
-            positions: mesh.positions.as_chunks().0,
-            tets: mesh.tets.as_chunks().0,
-            stiffness: &mesh.stiffness,
-        };
-        let forces = memory::tried(ElementForces::new(body, material, isa), WHAT)?;
+        let forces = ElementForces::new(mesh.tetrahedra(), material, isa);
+        let forces = memory::tried(forces, WHAT)?;
         Body::of(mesh, diagonal, forces)
     }
 

@@ -13,7 +13,7 @@
 
 mod cut;
 
-use ::elements::{Deformation, Moduli, stress, vector};
+use ::elements::{Deformation, Law, Moduli, stress, vector};
 
 use super::body::Body;
 use crate::bundle::{Mesh, volume};
@@ -34,6 +34,9 @@ pub(super) const NINE: usize = 9;
 pub struct FarField {
     #[held(skip)]
     pub(super) moduli: Moduli,
+    /// The law of each cluster where the body has several.
+    #[held(skip)]
+    laws: Vec<Law>,
     /// Chunks of a cluster, one after another.
     pub(super) group: usize,
     /// Rest volume of each chunk times its stiffness over the material's, mm³. After a cut these are the chunks of the intact body, with all that their
@@ -75,6 +78,7 @@ impl FarField {
         let count = elements.chunk_count();
         let mut own = FarField {
             moduli,
+            laws: Vec::new(),
             group: (count / CLUSTERS).max(1),
             volumes: memory::room(count, WHAT)?,
             packed_volumes: memory::room(count, WHAT)?,
@@ -87,6 +91,12 @@ impl FarField {
             edge_mm: 0.0,
             boxes: memory::room(count, WHAT)?,
         };
+        if !mesh.laws.is_empty() {
+            // Chunks have one law, and so have clusters.
+            own.group = 1;
+            let laws = (0..count).map(|chunk| elements.moduli_of(chunk).law);
+            own.laws = memory::collected(count, laws, WHAT)?;
+        }
         own.starts.push(0);
         for chunk in 0..count {
             own.push(body, mesh, chunk)?;
@@ -195,8 +205,16 @@ impl FarField {
         first..(first + self.group).min(self.volumes.len())
     }
 
-    /// What the law adds to the linear stress at `H = F - I`, Pa, and det F.
-    pub(super) fn added_stress(&self, h: [f64; NINE]) -> ([f64; NINE], f64) {
+    /// The material's moduli with the law of a cluster.
+    pub(super) fn moduli_of(&self, cluster: usize) -> Moduli {
+        Moduli {
+            law: self.laws.get(cluster).copied().unwrap_or(self.moduli.law),
+            ..self.moduli
+        }
+    }
+
+    /// What a cluster's law adds to the linear stress at `H = F - I`, Pa, and det F.
+    pub(super) fn added_stress(&self, cluster: usize, h: [f64; NINE]) -> ([f64; NINE], f64) {
         let mut f = [[0.0; 3]; 3];
         for (i, row) in f.iter_mut().enumerate() {
             for (j, value) in row.iter_mut().enumerate() {
@@ -215,7 +233,7 @@ impl FarField {
             det,
             invariant: f.iter().map(|row| vector::dot(*row, *row)).sum(),
         };
-        let stress = stress(&state, self.moduli);
+        let stress = stress(&state, self.moduli_of(cluster));
         let lambda = self.moduli.bulk_pa - 2.0 / 3.0 * self.moduli.shear_pa;
         let trace = h[0] + h[4] + h[8];
         let mut added = [0.0; NINE];

@@ -1,7 +1,7 @@
 //! The length of a scene's steps, and what of the corrections follows from it: BDF2's coefficients and the diagonal blocks of
 //! `K + kappa M`.
 
-use elements::{Material, Tetrahedra, Tetrahedron};
+use elements::{Material, Tetrahedron};
 
 use crate::bundle::Mesh;
 use crate::memory::{self, HeldBytes};
@@ -66,13 +66,8 @@ impl Diagonal {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn of(mesh: &Mesh, material: &Material) -> crate::error::Result<Diagonal> {
-        let positions = mesh.positions.as_chunks::<3>().0;
-        let tets = mesh.tets.as_chunks::<4>().0;
-        let body = Tetrahedra {
-            positions,
-            tets,
-            stiffness: &mesh.stiffness,
-        };
+        let body = mesh.tetrahedra();
+        let (positions, tets) = (body.positions, body.tets);
         let count = positions.len();
         let mut mass = memory::filled(count, 0.0f64, WHAT)?;
         let mut blocks = memory::filled(count, [0.0f64; 6], WHAT)?;

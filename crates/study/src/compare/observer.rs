@@ -136,13 +136,7 @@ impl Observer {
         scene.attach_points(Some(&points))?;
         Ok(Self {
             scene,
-            forces: ReactionForces::new(
-                mesh.positions.as_flattened(),
-                mesh.tets.as_flattened(),
-                &mesh.stiffness,
-                &free,
-                material.moduli(),
-            )?,
+            forces: ReactionForces::new(mesh.tetrahedra(), &free, material.moduli())?,
             internal: vec![0.0; 3 * free.len()],
             at_points: vec![0.0; points.len()],
             free,

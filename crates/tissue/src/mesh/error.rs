@@ -71,6 +71,8 @@ pub enum MeshError {
         "`stiffness` has {found} numbers, but there are {expected} tetrahedra; give one number per tetrahedron, or none"
     )]
     StiffnessCount { expected: usize, found: usize },
+    #[error(transparent)]
+    Laws(#[from] elements::MaterialError),
     #[error("the mesh has no {what}")]
     Empty { what: &'static str },
 }

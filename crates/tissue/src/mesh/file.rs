@@ -89,13 +89,30 @@ impl Mesh {
                     .collect(),
                 Err(_) => Vec::new(),
             },
+            region: match file.tensor("region") {
+                Ok(_) => (indices("region", None)?.into_iter().enumerate())
+                    .map(|(index, number)| {
+                        u8::try_from(number).map_err(|_| {
+                            let reason =
+                                format!("entry {index} is {number}; it must be at most 64");
+                            field("region", reason)
+                        })
+                    })
+                    .collect::<Result<_, _>>()?,
+                Err(_) => Vec::new(),
+            },
+            regions: match metadata.get("laws") {
+                Some(text) => serde_json::from_str(text)
+                    .map_err(|error| field("laws", format!("is no list of regions: {error}")))?,
+                None => Vec::new(),
+            },
         })
     }
 
     /// Validates and writes the mesh; the file is whole or absent.
     pub fn write(&self, path: &Path) -> Result<(), MeshError> {
         self.validate()?;
-        let metadata: BTreeMap<String, String> = [
+        let mut metadata: BTreeMap<String, String> = [
             ("format", "upt-mesh"),
             ("version", "1"),
             ("units", "mm"),
@@ -160,6 +177,15 @@ impl Mesh {
                     .iter()
                     .flat_map(|v| v.to_le_bytes())
                     .collect(),
+            ));
+        }
+        if !self.region.is_empty() {
+            metadata.insert("laws".into(), self.laws_text());
+            tensors.push(Tensor::new(
+                "region",
+                Dtype::I32,
+                vec![self.region.len()],
+                index_bytes(&mut self.region.iter().map(|number| u32::from(*number))),
             ));
         }
         tensors::write_file(path, &metadata, &tensors).map_err(|source| MeshError::Io {

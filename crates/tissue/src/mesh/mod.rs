@@ -43,6 +43,10 @@ pub struct Mesh {
     pub supported: Vec<u32>,
     /// `[T]` Young's modulus of each tetrahedron over the material's; empty where the body is uniform.
     pub stiffness: Vec<f32>,
+    /// `[T]` 0 for a tetrahedron of the material's law, else one more than the place of its region in `regions`; empty where the body has one law.
+    pub region: Vec<u8>,
+    /// Regions with a law of their own.
+    pub regions: Vec<elements::Region>,
 }
 
 /// Which nodes are held at zero displacement.
@@ -92,7 +96,27 @@ impl Mesh {
             positions: &self.positions,
             tets: &self.tets,
             stiffness: &self.stiffness,
+            laws: self.laws(),
         }
+    }
+
+    /// Which tetrahedra have which law.
+    pub fn laws(&self) -> elements::Laws<'_> {
+        elements::Laws {
+            of_tet: &self.region,
+            regions: &self.regions,
+        }
+    }
+
+    /// Checks the laws of the regions, and that those with a shear modulus of their own agree with the stiffness of their tetrahedra.
+    pub fn check_laws(&self, material: &elements::Material) -> Result<(), elements::MaterialError> {
+        self.laws()
+            .check_with(self.tets.len(), &self.stiffness, material)
+    }
+
+    /// The laws of the regions as the file has them.
+    fn laws_text(&self) -> String {
+        serde_json::to_string(&self.regions).unwrap_or_default()
     }
 
     /// Young's modulus of tetrahedron `tet` over the material's.
@@ -124,7 +148,7 @@ impl Mesh {
     }
 
     /// SHA-256 (lower-case hex) over the bytes of `positions`, `tets`, `fixed`, `supported` and,
-    /// where there is one, `stiffness` as the file stores them. Identifies the mesh in trajectories, datasets and bundles.
+    /// where there is one, `stiffness`, and `region` and the text `laws`, as the file stores them. Identifies the mesh in trajectories, datasets and bundles.
     pub fn hash(&self) -> String {
         let mut digest = Sha256::new();
         for value in self.positions.iter().flatten() {
@@ -138,6 +162,12 @@ impl Mesh {
         }
         for value in &self.stiffness {
             digest.update(value.to_le_bytes());
+        }
+        if !self.region.is_empty() {
+            for number in &self.region {
+                digest.update(i32::from(*number).to_le_bytes());
+            }
+            digest.update(self.laws_text());
         }
         digest
             .finalize()

@@ -32,6 +32,7 @@ impl Mesh {
         )?;
         self.check_tets()?;
         self.check_stiffness()?;
+        self.laws().check(self.tets.len())?;
         self.check_references()?;
         self.check_surface()?;
         self.check_sets()

@@ -11,6 +11,9 @@ pub(super) struct Topology {
     pub domain: BTreeSet<[u32; 3]>,
     /// Of the mesh's elements; empty where the body is uniform.
     pub stiffness: Vec<f32>,
+    /// Of the mesh's elements; empty where the body has one law.
+    pub region: Vec<u8>,
+    pub regions: Vec<elements::Region>,
     /// Made at the first change.
     pub body: Option<Body>,
 }
@@ -27,6 +30,8 @@ impl Topology {
                 })
                 .collect(),
             stiffness: mesh.stiffness.clone(),
+            region: mesh.region.clone(),
+            regions: mesh.regions.clone(),
             body: None,
         }
     }

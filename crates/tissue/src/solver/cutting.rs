@@ -8,7 +8,7 @@ use super::parts::Parts;
 use super::relaxing::Relaxing;
 use super::{Solver, SolverError};
 use contact::{SPACING_MM, Samples};
-use elements::{PADDING, Partition, Tetrahedra};
+use elements::{Laws, PADDING, Partition, Tetrahedra};
 use std::sync::Arc;
 use topology::{
     Blade, Body, Change, Element, Fragment, Point, RestMesh, Sweep, TopologyError, origin,
@@ -138,17 +138,22 @@ impl Solver {
             .map(|node| self.positions[body.parent(node) as usize])
             .collect();
         let (mut tets, mut shares) = (Vec::new(), Vec::new());
-        let mut stiffness = Vec::new();
+        let (mut stiffness, mut region) = (Vec::new(), Vec::new());
         for element in body.elements() {
             tets.push(element.nodes);
             shares.push(element.share as f32);
             let own = self.topology.stiffness.get(element.parent as usize);
             stiffness.push(own.copied().unwrap_or(1.0) * element.stiffness);
+            region.extend(self.topology.region.get(element.parent as usize));
         }
         let tetrahedra = Tetrahedra {
             positions: &positions,
             tets: &tets,
             stiffness: &stiffness,
+            laws: Laws {
+                of_tet: &region,
+                regions: &self.topology.regions,
+            },
         };
         let held = self.held_copies(&body);
         let parts = Parts::new(tetrahedra, &shares, &held, &self.options)?;

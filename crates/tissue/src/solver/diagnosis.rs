@@ -65,7 +65,7 @@ impl Solver {
     fn diagnose_chunk(&self, chunk: &Chunk) -> Diagnosis {
         let mut result = Diagnosis::NONE;
         let bulk = self.options.material.bulk_pa();
-        let moduli = self.options.material.moduli();
+        let moduli = self.partition.moduli_of(chunk);
         let shear_over_bulk = moduli.shear_pa / bulk;
         self.partition.elements(chunk).for_each(|element| {
             let number = element.number as usize;

@@ -147,6 +147,7 @@ impl Solver {
     ) -> Result<Self, SolverError> {
         mesh.validate()?;
         options.validate()?;
+        mesh.check_laws(&options.material)?;
         let isa = options.isa.unwrap_or_else(Isa::detect);
         let kernels = Kernels::of(isa).ok_or(SolverError::IsaUnavailable(isa))?;
         let pool = match options.threads {

@@ -12,17 +12,29 @@ use elements::{Moduli, Tetrahedron};
 /// The energy of a body as a function of its displacement.
 pub(crate) struct StrainEnergy {
     elements: Vec<Tetrahedron>,
-    /// mN/mm².
-    moduli: Moduli,
+    /// mN/mm², by number of a law ([`elements::Laws`]).
+    moduli: Vec<Moduli>,
+    /// Numbers of the elements' laws; empty where the body has one.
+    region: Vec<u8>,
 }
 
 /// A material's moduli in mN/mm².
-pub(super) fn moduli(material: &Material) -> Moduli {
+fn moduli(material: &Material) -> Moduli {
     Moduli {
         shear_pa: material.shear_pa() * 1e-3,
         bulk_pa: material.bulk_pa() * 1e-3,
         law: material.law,
     }
+}
+
+/// The same by number of a law.
+pub(super) fn moduli_by_law(mesh: &Mesh, material: &Material) -> Vec<Moduli> {
+    let own = moduli(material);
+    let others = mesh.regions.iter().map(|region| Moduli {
+        law: region.law,
+        ..own
+    });
+    std::iter::once(own).chain(others).collect()
 }
 
 /// The energy and its least volume ratio at one displacement.
@@ -43,7 +55,8 @@ impl StrainEnergy {
         });
         Self {
             elements: elements.collect(),
-            moduli: moduli(material),
+            moduli: moduli_by_law(mesh, material),
+            region: mesh.region.clone(),
         }
     }
 
@@ -56,7 +69,8 @@ impl StrainEnergy {
             value: 0.0,
             min_det: f64::INFINITY,
         };
-        for element in &self.elements {
+        for (tet, element) in self.elements.iter().enumerate() {
+            let moduli = self.moduli[usize::from(self.region.get(tet).copied().unwrap_or(0))];
             let at = element.corners.map(|node| 3 * node as usize);
             let state = element.deformation(at.map(|at| [u[at], u[at + 1], u[at + 2]]));
             if state.det.is_nan() || state.det <= 0.0 {
@@ -65,8 +79,8 @@ impl StrainEnergy {
                 return sum;
             }
             sum.min_det = sum.min_det.min(state.det);
-            sum.value += element.volume * energy_density(&state, self.moduli);
-            for (at, force) in at.into_iter().zip(element.forces(&state, self.moduli)) {
+            sum.value += element.volume * energy_density(&state, moduli);
+            for (at, force) in at.into_iter().zip(element.forces(&state, moduli)) {
                 for (axis, force) in force.into_iter().enumerate() {
                     gradient[at + axis] += force;
                 }

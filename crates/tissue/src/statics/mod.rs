@@ -20,7 +20,7 @@ use crate::contact::{ContactDomain, ContactError};
 use crate::linear::{
     ColumnsError, ColumnsFile, ContactFactor, Factor, Lame, LinearError, Stiffness,
 };
-use crate::material::Material;
+use crate::material::{Material, MaterialError};
 use crate::mesh::{Boundary, Mesh};
 use crate::schemes::{Programme, Scheme};
 use crate::simulate::SOLVER_NAME;
@@ -41,6 +41,8 @@ pub enum StaticsError {
     Contact(#[from] ContactError),
     #[error(transparent)]
     Linear(#[from] LinearError),
+    #[error(transparent)]
+    Material(#[from] MaterialError),
     #[error(transparent)]
     Columns(#[from] ColumnsError),
     /// The mesh has another domain than the one that the columns were made for.
@@ -84,6 +86,7 @@ impl StaticSolver {
         material: Material,
         columns: &FilePath,
     ) -> Result<Self, StaticsError> {
+        mesh.check_laws(&material)?;
         let domain = ContactDomain::new(mesh, boundary)?;
         let columns =
             ColumnsFile::open(columns, mesh, boundary, material.young_pa, material.poisson)?;

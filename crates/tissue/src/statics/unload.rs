@@ -13,7 +13,7 @@
 use elements::{Moduli, Tetrahedron};
 
 use super::StaticsError;
-use super::energy::moduli;
+use super::energy::moduli_by_law;
 use crate::linear::{Factor, Lame, Stiffness};
 use crate::material::Material;
 use crate::mesh::Mesh;
@@ -42,11 +42,12 @@ pub fn unload(
     let mut held = held.to_vec();
     held.sort_unstable();
     held.dedup();
+    mesh.check_laws(material)?;
     let lame = Lame::from_young(material.young_pa, material.poisson)?;
     let stiffness = Stiffness::assemble(mesh, &held, lame)?;
     let scan = Scan {
         mesh,
-        moduli: moduli(material),
+        moduli: moduli_by_law(mesh, material),
         density: material.density_g_mm3(),
         factor: Factor::new(&stiffness, &mesh.positions, 1)?,
         free: stiffness.free.nodes,
@@ -77,7 +78,8 @@ pub fn unload(
 struct Scan<'a> {
     mesh: &'a Mesh,
     /// mN/mm².
-    moduli: Moduli,
+    /// By number of a law.
+    moduli: Vec<Moduli>,
     /// g/mm³.
     density: f64,
     factor: Factor,
@@ -155,9 +157,10 @@ impl Scan<'_> {
             if state.det.is_nan() || state.det <= 0.0 {
                 return None;
             }
+            let moduli = self.moduli[usize::from(self.mesh.laws().number_of(at))];
             // g m/s² is mN.
             let weight = gravity.map(|g| 0.25 * volume * self.density * g);
-            for (node, force) in corners.iter().zip(element.forces(&state, self.moduli)) {
+            for (node, force) in corners.iter().zip(element.forces(&state, moduli)) {
                 let sum = &mut sums[*node as usize];
                 (0..3).for_each(|k| sum[k] += force[k] - weight[k]);
             }

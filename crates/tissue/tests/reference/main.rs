@@ -11,6 +11,7 @@ mod determinism;
 mod dynamics;
 mod failures;
 mod groups;
+mod laws;
 mod metrics;
 mod stiffness;
 mod ties;

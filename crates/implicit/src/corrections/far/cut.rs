@@ -40,6 +40,7 @@ impl FarField {
         let (count, parents) = (self.volumes.len(), forces.cut_chunks());
         let mut own = FarField {
             moduli: self.moduli,
+            laws: memory::copied(&self.laws, WHAT)?,
             group: self.group,
             volumes: memory::copied(&self.volumes, WHAT)?,
             packed_volumes: memory::room(forces.chunk_count(), WHAT)?,

@@ -122,7 +122,7 @@ impl Clusters {
         let range = cluster * NINE..(cluster + 1) * NINE;
         let (base, moved) = (&self.base[range.clone()], &self.moved[range]);
         let h = std::array::from_fn(|at| (base[at] + f64::from(moved[at])) / volume);
-        far.added_stress(h)
+        far.added_stress(cluster, h)
     }
 
     /// What the law adds on the modes, beyond what it adds at the base, where the modes have moved by `modal` since; µN. Gives the smallest det

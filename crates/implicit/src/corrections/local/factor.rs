@@ -10,11 +10,10 @@
 //! for that: with the compliance of the body at rest the forces that it finds are not those that the iterations balance
 //! (`docs/decisions/026-near-factor.md`).
 
-use ::elements::Moduli;
-
 use super::linear::WHAT;
 use super::linearisation::Linearisation;
 use super::near::NearSet;
+use crate::corrections::far::FarField;
 use crate::corrections::precondition::Env;
 use crate::error::{Error, Result};
 use crate::kernels::Isa;
@@ -174,7 +173,7 @@ impl NearFactor {
     }
 
     /// Makes the factor that serves a state `[K,3]`: that of the state where it was taken last, unless that is another's or has been deformed since.
-    pub fn renew(&mut self, env: Env<'_>, near: &NearSet, moduli: Moduli, u: &[f32]) -> Result<()> {
+    pub fn renew(&mut self, env: Env<'_>, near: &NearSet, far: &FarField, u: &[f32]) -> Result<()> {
         let _span = tracing::trace_span!("factor").entered();
         let kappa = env.time_step.integrator.kappa() as f32;
         let serves = self.current.is_of(&near.centres, kappa)
@@ -193,7 +192,7 @@ impl NearFactor {
         self.made.clear();
         self.generation += 1;
         for (is_at_rest, more) in ATTEMPTS {
-            self.assemble(env, near, moduli, (is_at_rest, more));
+            self.assemble(env, near, far, (is_at_rest, more));
             if self.factor.factor(env.isa, &self.rows)? {
                 self.made.take(&self.current);
                 return Ok(());
@@ -225,7 +224,7 @@ impl NearFactor {
         &mut self,
         env: Env<'_>,
         near: &NearSet,
-        moduli: Moduli,
+        far: &FarField,
         (is_at_rest, more): (bool, f32),
     ) {
         self.rows.blocks.fill([0.0; 9]);
@@ -234,7 +233,7 @@ impl NearFactor {
             if *targets == [NONE; 16] {
                 continue;
             }
-            let element = near.elements.tetrahedron(at, moduli);
+            let (element, moduli) = near.elements.tetrahedron(at, far);
             let rest = element.deformation([[0.0; 3]; 4]);
             let moved = element
                 .corners

@@ -64,14 +64,15 @@ impl LinearElements {
         self.0.iter().map(|element| element.places)
     }
 
-    /// An element, its corners as places.
-    pub fn tetrahedron(&self, at: usize, moduli: Moduli) -> Tetrahedron {
+    /// An element, its corners as places, and its moduli.
+    pub fn tetrahedron(&self, at: usize, far: &FarField) -> (Tetrahedron, Moduli) {
         let element = &self.0[at];
-        Tetrahedron {
+        let tetrahedron = Tetrahedron {
             corners: element.places,
-            volume: f64::from(element.shear) / moduli.shear_pa,
+            volume: f64::from(element.shear) / far.moduli.shear_pa,
             gradients: element.gradients.map(|g| g.map(f64::from)),
-        }
+        };
+        (tetrahedron, far.moduli_of(element.cluster as usize))
     }
 
     /// The largest entry of the gradient of a field in an element.

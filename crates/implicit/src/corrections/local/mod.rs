@@ -229,7 +229,7 @@ impl LocalSolver {
             self.factor.plan(&self.near, rest)?;
             self.near.finish();
         }
-        (self.factor).renew(env, &self.near, far.moduli, base.u)?;
+        (self.factor).renew(env, &self.near, far, base.u)?;
         self.pairs
             .lay_out(env, &self.near, step.preconditioner, &mut self.room)?;
         self.now.clear(&self.near)?;

@@ -1,66 +1,11 @@
 //! The SIMD forces of a whole body against the f64 law, element by element.
 
-use elements::{
-    CutTetrahedra, ElementForces, Isa, Law, Material, MooneyRivlin, Ogden, Subset, Tetrahedron,
-};
-use tissue::mesh::{Mesh, box_phantom};
+mod bodies;
+mod regions;
 
-fn body() -> Mesh {
-    let mut mesh = box_phantom([30.0, 40.0, 50.0], [7, 9, 12]).unwrap();
-    mesh.stiffness = (0..mesh.tets.len())
-        .map(|tet| 1.0 + (tet % 5) as f32 * 0.3)
-        .collect();
-    mesh
-}
-
-fn wave(mesh: &Mesh, size: f32) -> Vec<f32> {
-    let rows = mesh.positions.iter().enumerate();
-    rows.flat_map(|(i, p)| {
-        [0, 1, 2].map(|k| size * (0.21 * p[k] + 0.13 * p[(k + 1) % 3] + i as f32 * 0.01).sin())
-    })
-    .collect()
-}
-
-fn exact(mesh: &Mesh, material: &Material, u: &[f32]) -> (Vec<f64>, f64) {
-    let mut out = vec![0.0; u.len()];
-    let mut least = f64::INFINITY;
-    for (at, &corners) in mesh.tets.iter().enumerate() {
-        let rest = corners.map(|node| mesh.positions[node as usize].map(f64::from));
-        let tet = Tetrahedron::new(corners, rest, f64::from(mesh.stiffness_of(at)));
-        let state =
-            tet.deformation(corners.map(|n| [0, 1, 2].map(|k| f64::from(u[3 * n as usize + k]))));
-        least = least.min(state.det);
-        for (node, force) in corners.iter().zip(tet.forces(&state, material.moduli())) {
-            for k in 0..3 {
-                out[3 * *node as usize + k] += force[k];
-            }
-        }
-    }
-    (out, least)
-}
-
-/// Even exponents, broken ones, several terms.
-fn ogden_laws() -> [Material; 4] {
-    [
-        vec![[-163.0, -18.0]],
-        vec![[-157.0, -18.7]],
-        vec![[500.0, 2.0], [-20.0, -12.0]],
-        vec![[630.0, 1.3], [-10.0, -24.0]],
-    ]
-    .map(|terms| Material::default().with_law(Law::Ogden(Ogden::new(&terms).unwrap())))
-}
-
-fn forces_on(isa: Isa, mesh: &Mesh, material: &Material, u: &[f32]) -> Vec<f32> {
-    let forces = ElementForces::new(mesh.tetrahedra(), material, isa).unwrap();
-    let mut scratch = forces.scratch(1).unwrap();
-    let mut out = vec![f32::NAN; u.len()];
-    forces.evaluate(u, &mut scratch, &mut out, &serial);
-    out
-}
-
-fn serial(count: usize, task: &(dyn Fn(usize, usize) + Sync)) {
-    (0..count).for_each(|chunk| task(chunk, 0));
-}
+use bodies::{body, exact, forces_on, mixed, ogden_laws, serial, wave};
+use elements::{CutTetrahedra, ElementForces, Isa, Law, Material, MooneyRivlin, Subset};
+use tissue::mesh::Mesh;
 
 /// Verifies REQ-081.
 #[test]
@@ -128,9 +73,12 @@ fn check(material: &Material) {
 }
 
 fn check_at(material: &Material, size: f32) {
-    let mesh = body();
-    let u = wave(&mesh, size);
-    let (want, least) = exact(&mesh, material, &u);
+    check_of(&body(), material, size);
+}
+
+fn check_of(mesh: &Mesh, material: &Material, size: f32) {
+    let u = wave(mesh, size);
+    let (want, least) = exact(mesh, material, &u);
     let scale = want.iter().fold(0.0f64, |a, b| a.max(b.abs()));
     for isa in Isa::available() {
         let forces = ElementForces::new(mesh.tetrahedra(), material, isa).unwrap();
@@ -148,13 +96,13 @@ fn check_at(material: &Material, size: f32) {
 #[test]
 fn threads_do_not_change_a_bit() {
     for material in [Material::default(), ogden_laws()[0], ogden_laws()[1]] {
-        check_threads(&material);
+        check_threads(&body(), &material);
     }
+    check_threads(&mixed(), &Material::default());
 }
 
-fn check_threads(material: &Material) {
-    let mesh = body();
-    let u = wave(&mesh, 0.6);
+fn check_threads(mesh: &Mesh, material: &Material) {
+    let u = wave(mesh, 0.6);
     let forces = ElementForces::new(mesh.tetrahedra(), material, Isa::detect()).unwrap();
     let run = |parallel: elements::ParallelFor<'_>| {
         let mut scratch = forces.scratch(3).unwrap();
@@ -236,10 +184,13 @@ fn forces_about(
 
 #[test]
 fn a_subset_has_the_forces_of_the_body_where_it_is_whole() {
-    let mesh = body();
-    let u = wave(&mesh, 0.3);
-    let all = mesh.positions.len() as u32;
-    for material in [Material::default(), ogden_laws()[0]] {
+    let u = wave(&body(), 0.3);
+    let all = body().positions.len() as u32;
+    for (mesh, material) in [
+        (body(), Material::default()),
+        (body(), ogden_laws()[0]),
+        (mixed(), Material::default()),
+    ] {
         for isa in Isa::available() {
             let forces = ElementForces::new(mesh.tetrahedra(), &material, isa).unwrap();
             let expected = forces_on(isa, &mesh, &material, &u);
@@ -266,7 +217,15 @@ fn a_subset_has_the_forces_of_the_body_where_it_is_whole() {
 /// A body of which some elements are gone and others have become two, one of them with copies of two nodes, against the same elements packed from nothing.
 #[test]
 fn a_cut_body_has_the_forces_of_its_elements_whatever_they_were_packed_with() {
-    let mesh = body();
+    for (mesh, materials) in [
+        (body(), vec![Material::default(), ogden_laws()[0]]),
+        (mixed(), vec![Material::default()]),
+    ] {
+        check_cut(&mesh, &materials);
+    }
+}
+
+fn check_cut(mesh: &Mesh, materials: &[Material]) {
     let count = mesh.tets.len();
     let is_gone = |element: &u32| mesh.tets[*element as usize].contains(&0);
     let mut changed: Vec<u32> = (0..count as u32).filter(|e| e % 7 == 0).collect();
@@ -307,14 +266,18 @@ fn a_cut_body_has_the_forces_of_its_elements_whatever_they_were_packed_with() {
     whole.tets.extend(cells.iter().map(|cell| cell.1));
     whole.stiffness.extend(cells.iter().map(|cell| cell.2));
     whole.positions = positions;
+    let numbers = |element: &usize| mesh.region.get(*element).copied();
+    let parents = cells.iter().map(|cell| changed[cell.0 as usize] as usize);
+    let all = left.iter().copied().chain(parents);
+    whole.region = all.filter_map(|element| numbers(&element)).collect();
     let mut u = wave(&whole, 0.3);
     // What no element is left of may be turned inside out.
     assert!(!whole.tets.as_flattened().contains(&0));
     u[0] += 50.0;
-    for material in [Material::default(), ogden_laws()[0]] {
-        let (exact, least) = exact(&whole, &material, &u);
+    for material in materials {
+        let (exact, least) = exact(&whole, material, &u);
         for isa in Isa::available() {
-            let intact = ElementForces::new(mesh.tetrahedra(), &material, isa).unwrap();
+            let intact = ElementForces::new(mesh.tetrahedra(), material, isa).unwrap();
             let cut = CutTetrahedra {
                 positions: &whole.positions,
                 tets: &mesh.tets,
@@ -322,7 +285,7 @@ fn a_cut_body_has_the_forces_of_its_elements_whatever_they_were_packed_with() {
                 changed: &changed,
                 cells: &cells,
             };
-            let own = intact.cut(cut, &material).unwrap();
+            let own = intact.cut(cut, material).unwrap();
             let mut numbers: Vec<u32> = (0..own.chunk_count())
                 .flat_map(|chunk| own.chunk_tetrahedra(chunk).map(|(number, _)| number))
                 .collect();

@@ -1,0 +1,168 @@
+//! `--material REGION=LAW`: regions with a law of their own.
+
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+
+use anyhow::{Context, Result, bail};
+use elements::{Law, MOST_REGIONS, Material, Region as LawRegion};
+use tissue::mesh::Mesh;
+use tissue::mesh_import::{Region, tets_in};
+
+use super::options::Options;
+use super::stages::Stage;
+use crate::materials;
+
+/// A value of `--material`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Choice {
+    /// Young's modulus, density and damping of the body by name.
+    Numbers(String),
+    /// The law of a region, and how it was written.
+    Law(LawRegion, String),
+}
+
+impl FromStr for Choice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let Some((name, law)) = text.split_once('=') else {
+            return Ok(Self::Numbers(text.trim().to_owned()));
+        };
+        let name = name.trim().to_owned();
+        if name.is_empty() {
+            return Err(format!("`{text}` has no region before its equals sign"));
+        }
+        let own =
+            materials::law(law.trim()).map_err(|error| format!("region `{name}`: {error}"))?;
+        let region = LawRegion {
+            source: materials::source_of(&own),
+            law: own,
+            name,
+        };
+        Ok(Self::Law(region, law.trim().to_owned()))
+    }
+}
+
+impl fmt::Display for Choice {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Numbers(name) => to.write_str(name),
+            Self::Law(region, law) => write!(to, "{}={law}", region.name),
+        }
+    }
+}
+
+/// Gives the tetrahedra of the regions their laws, and the stiffness of laws that have a modulus of their own.
+pub fn apply(
+    mesh: &mut Mesh,
+    options: &Options,
+    (input, scale): (&Path, f64),
+    stage: &mut Stage,
+) -> Result<()> {
+    let chosen: Vec<&LawRegion> = (options.material.iter())
+        .filter_map(|choice| match choice {
+            Choice::Law(region, _) => Some(region),
+            Choice::Numbers(_) => None,
+        })
+        .collect();
+    for region in &options.region {
+        let name = region.name.as_deref().with_context(|| {
+            format!("--region {region} has no name; write --region NAME=REGION")
+        })?;
+        if !chosen.iter().any(|own| own.name == name) {
+            bail!("region `{name}` has no law; give --material {name}=LAW");
+        }
+    }
+    let material = options.material()?;
+    for own in chosen {
+        let rows = tets_of(mesh, options, (input, scale), &own.name)?;
+        if rows.is_empty() {
+            bail!("no tetrahedron lies in region `{}` of --material", own.name);
+        }
+        take(mesh, own, &rows, &material)?;
+        let source = match own.source.is_empty() {
+            true => String::new(),
+            false => format!(", from {}", own.source),
+        };
+        stage.decided(&format!(
+            "{} tetrahedra of region `{}` have the law {}{source}",
+            rows.len(),
+            own.name,
+            own.law
+        ));
+    }
+    mesh.check_laws(&material)?;
+    Ok(())
+}
+
+/// The tetrahedra of a region by name: as `--region` has it, else as the mesh file has it, else a group of the input.
+fn tets_of(
+    mesh: &Mesh,
+    options: &Options,
+    (input, scale): (&Path, f64),
+    name: &str,
+) -> Result<Vec<usize>> {
+    let mut rows = Vec::new();
+    let named = || (options.region.iter()).filter(|region| region.name.as_deref() == Some(name));
+    for region in named() {
+        rows.extend(tets_in(mesh, &region.region.open(input, scale)?));
+    }
+    if named().next().is_some() {
+        rows.sort_unstable();
+        rows.dedup();
+        return Ok(rows);
+    }
+    if let Some(at) = mesh.regions.iter().position(|region| region.name == name) {
+        let is_own = |row: &usize| usize::from(mesh.region[*row]) == at + 1;
+        return Ok((0..mesh.tets.len()).filter(is_own).collect());
+    }
+    let group = Region::Group(name.to_owned()).open(input, scale);
+    let group = group.with_context(|| {
+        format!("--material {name}=: there is no region of that name; give --region {name}=REGION")
+    })?;
+    Ok(tets_in(mesh, &group))
+}
+
+fn take(mesh: &mut Mesh, own: &LawRegion, rows: &[usize], material: &Material) -> Result<()> {
+    mesh.region.resize(mesh.tets.len(), 0);
+    let at = match mesh
+        .regions
+        .iter()
+        .position(|region| region.name == own.name)
+    {
+        Some(at) => {
+            mesh.regions[at] = own.clone();
+            at
+        }
+        None => {
+            mesh.regions.push(own.clone());
+            mesh.regions.len() - 1
+        }
+    };
+    if at >= MOST_REGIONS {
+        bail!("more than {MOST_REGIONS} regions have a law of their own");
+    }
+    let before = |row: &usize| mesh.region[*row];
+    let was_plain = rows.iter().all(|row| before(row) == 0);
+    let modulus = own.law.young_pa(material.poisson);
+    let uneven = rows.iter().any(|row| mesh.stiffness_of(*row) != 1.0);
+    if modulus.is_some() && uneven && was_plain {
+        bail!(
+            "region `{}` has a law with a modulus of its own, and another stiffness by --stiffness or its mesh file: give one of them",
+            own.name
+        );
+    }
+    rows.iter().for_each(|&row| mesh.region[row] = at as u8 + 1);
+    if let Some(young) = modulus {
+        mesh.stiffness.resize(mesh.tets.len(), 1.0);
+        let factor = (young / material.young_pa) as f32;
+        rows.iter().for_each(|&row| mesh.stiffness[row] = factor);
+    }
+    Ok(())
+}
+
+/// The law of the whole body, for the provenance.
+pub fn words(law: &Law) -> serde_json::Value {
+    serde_json::json!({"law": law.to_string(), "source": materials::source_of(law)})
+}

@@ -1,0 +1,137 @@
+//! Regions of a body that have a law of their own.
+//!
+//! A region's law gives the shape of the stress; how stiff it is against the rest of the body is the stiffness of its tetrahedra. So at rest a body of several
+//! laws is one of several stiffnesses, and modes, linear response and compliance know nothing of laws. Poisson's ratio, damping and relaxation are
+//! the body's.
+
+use crate::fault::MaterialError;
+use crate::laws::Law;
+use crate::material::{Material, Moduli};
+use serde::{Deserialize, Serialize};
+
+/// Regions of a body at most.
+pub const MOST_REGIONS: usize = 64;
+/// Part by which the stiffness of a tetrahedron may differ from that of a law which has its own shear modulus.
+const SAME_MODULUS: f64 = 1e-3;
+
+/// A region, as files have it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    pub name: String,
+    pub law: Law,
+    /// Where its constants come from: a DOI, a test. Left out of files where nothing is known.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub source: String,
+}
+
+impl Region {
+    /// Bytes of the heap that it holds.
+    pub fn bytes(&self) -> usize {
+        self.name.capacity() + self.source.capacity()
+    }
+}
+
+/// Which tetrahedra have which law.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Laws<'a> {
+    /// `[T]`: 0 for the material's law, else one more than the place in `regions`. Empty where the whole body has the material's.
+    pub of_tet: &'a [u8],
+    pub regions: &'a [Region],
+}
+
+impl Laws<'_> {
+    /// The number of a tetrahedron's law.
+    pub fn number_of(&self, tet: usize) -> u8 {
+        self.of_tet.get(tet).copied().unwrap_or(0)
+    }
+
+    /// The material's moduli with the law of a tetrahedron.
+    pub fn moduli_of(&self, tet: usize, own: Moduli) -> Moduli {
+        match usize::from(self.number_of(tet)).checked_sub(1) {
+            None => own,
+            Some(at) => Moduli {
+                law: self.regions[at].law,
+                ..own
+            },
+        }
+    }
+
+    /// Checks names and constants of the regions, and that every tetrahedron has a law.
+    ///
+    /// # Errors
+    /// The first fault, with the region's name.
+    pub fn check(&self, tets: usize) -> Result<(), MaterialError> {
+        let fail = |field: String, value: usize, wanted: String| {
+            MaterialError::some(field, value as f64, wanted).map_or(Ok(()), Err)
+        };
+        let count = self.regions.len();
+        if count > MOST_REGIONS {
+            let wanted = format!("at most {MOST_REGIONS}");
+            return fail("number of regions with a law".into(), count, wanted);
+        }
+        for (at, region) in self.regions.iter().enumerate() {
+            let mut before = self.regions[..at].iter();
+            if region.name.is_empty() || before.any(|other| other.name == region.name) {
+                let field = format!("region `{}`", region.name);
+                return fail(field, at, "a region with a name of its own".into());
+            }
+            if let Some(fault) = region.law.fault() {
+                return Err(MaterialError {
+                    field: format!("region `{}`: {}", region.name, fault.field).into(),
+                    ..fault
+                });
+            }
+        }
+        if self.of_tet.len() != tets && !(self.of_tet.is_empty() && count == 0) {
+            let wanted = format!("{tets}, a region for each tetrahedron");
+            return fail("length of `region`".into(), self.of_tet.len(), wanted);
+        }
+        let has_none = |number: &u8| usize::from(*number) > count;
+        match self.of_tet.iter().position(has_none) {
+            None => Ok(()),
+            Some(tet) => fail(
+                format!("region of tetrahedron {tet}"),
+                self.of_tet[tet].into(),
+                format!("at most {count}: there is no law for it"),
+            ),
+        }
+    }
+
+    /// The same, and that laws with a shear modulus of their own agree with the stiffness of their tetrahedra.
+    ///
+    /// # Errors
+    /// The first fault, with the region's name.
+    pub fn check_with(
+        &self,
+        tets: usize,
+        stiffness: &[f32],
+        material: &Material,
+    ) -> Result<(), MaterialError> {
+        self.check(tets)?;
+        for (tet, number) in self.of_tet.iter().enumerate() {
+            let Some(region) = (usize::from(*number).checked_sub(1)).map(|at| &self.regions[at])
+            else {
+                continue;
+            };
+            let Some(young) = region.law.young_pa(material.poisson) else {
+                continue;
+            };
+            let wanted = young / material.young_pa;
+            let own = stiffness.get(tet).map_or(1.0, |own| f64::from(*own));
+            if (own - wanted).abs() > SAME_MODULUS * wanted {
+                return Err(MaterialError {
+                    field: format!("region `{}`: stiffness of tetrahedron {tet}", region.name)
+                        .into(),
+                    value: own,
+                    wanted: format!(
+                        "{wanted:.6}, Young's modulus of the region's law ({young:.6} Pa, its mu in Pa) over the material's of {} Pa",
+                        material.young_pa
+                    )
+                    .into(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
