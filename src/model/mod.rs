@@ -146,7 +146,7 @@ impl Model {
         let mut mesh = Mesh::parse(&mesh_file, manifest.boundary)?;
         mesh.take_named(&manifest.supports, &manifest.regions)?;
         mesh.check_laws(&manifest.mesh.file, &manifest.material)?;
-        mesh.check_named_laws(&manifest.laws)?;
+        mesh.check_named_laws(&mesh_file, &manifest.laws)?;
         if mesh.node_count() != manifest.mesh.nodes {
             return Err(crate::error::Error::bundle(
                 "bundle.json",

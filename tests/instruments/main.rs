@@ -16,6 +16,7 @@ mod fixture;
 #[path = "../host/mod.rs"]
 mod host;
 mod portable;
+mod regions;
 mod relaxing;
 mod through_the_abi;
 

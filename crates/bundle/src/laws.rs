@@ -2,6 +2,8 @@
 
 use elements::{Laws, Material, MaterialError, Region};
 
+use serde_json::Value;
+
 use super::faults::bad;
 use super::mesh::Mesh;
 use super::tensors::TensorFile;
@@ -11,7 +13,7 @@ use crate::memory;
 /// Numbers of the laws of a mesh's tetrahedra, and the regions.
 pub(super) fn read(file: &TensorFile, tets: usize) -> Result<(Vec<u8>, Vec<Region>)> {
     let regions: Vec<Region> = match file.text().get("laws") {
-        Some(text) => serde_json::from_str(text).map_err(|error| {
+        Some(text) => Region::list(text).map_err(|error| {
             let problem = format!("metadata `laws` is no list of regions: {error}");
             Error::bundle(file.name(), problem)
         })?,
@@ -58,22 +60,18 @@ impl Mesh {
     ///
     /// # Errors
     /// [`Error::Bundle`] with the region.
-    pub fn check_named_laws(&self, named: &[Region]) -> Result<()> {
-        let differs = |at: &usize| named.get(*at) != self.laws.get(*at);
-        let Some(at) = (0..named.len().max(self.laws.len())).find(differs) else {
+    pub fn check_named_laws(&self, file: &TensorFile, named: &Value) -> Result<()> {
+        let own = file.text().get("laws").map_or(Ok(Value::Null), |text| {
+            serde_json::from_str(text)
+                .map_err(|error| Error::bundle(file.name(), error.to_string()))
+        })?;
+        let count = |list: &Value| list.as_array().map_or(0, Vec::len);
+        let differs = |at: &usize| own.get(*at) != named.get(*at);
+        let Some(at) = (0..count(&own).max(count(named))).find(differs) else {
             return Ok(());
         };
-        let problem = match (self.laws.get(at), named.get(at)) {
-            (Some(own), None) => format!(
-                "is missing; the mesh has {} in region `{}`",
-                own.law, own.name
-            ),
-            (Some(own), Some(named)) => format!(
-                "is {} in region `{}`; the mesh has {} in region `{}`",
-                named.law, named.name, own.law, own.name
-            ),
-            (None, _) => "names a region that the mesh lacks".to_owned(),
-        };
+        let told = |list: &Value| list.get(at).map_or("nothing".to_owned(), Value::to_string);
+        let problem = format!("is {}; the mesh has {}", told(named), told(&own));
         Err(bad(&format!("laws[{at}]"), problem))
     }
 }

@@ -336,9 +336,9 @@ pub struct Manifest {
     /// Named parts of the surface, which may overlap.
     #[serde(default)]
     pub regions: Vec<NodeSet>,
-    /// Regions with a law of their own, as the mesh has them.
+    /// Regions with a law of their own, as the mesh has them; null where it has none.
     #[serde(default)]
-    pub laws: Vec<elements::Region>,
+    pub laws: serde_json::Value,
     /// Gravity under which the mesh was scanned, m/s², where a step's input gives none; absent: zero.
     #[serde(default)]
     pub gravity_at_rest_m_s2: [f32; 3],

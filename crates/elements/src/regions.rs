@@ -26,6 +26,14 @@ pub struct Region {
 }
 
 impl Region {
+    /// The regions of a list that files have as JSON.
+    ///
+    /// # Errors
+    /// What is wrong with the text.
+    pub fn list(text: &str) -> Result<Vec<Self>, String> {
+        serde_json::from_str(text).map_err(|error| error.to_string())
+    }
+
     /// Bytes of the heap that it holds.
     pub fn bytes(&self) -> usize {
         self.name.capacity() + self.source.capacity()

@@ -50,7 +50,7 @@ pub struct Options {
     #[arg(long, value_name = "NUMBER|NAME")]
     pub part: Option<String>,
     /// Region whose nodes are held: ball:x,y,z,r, plane:a,b,c,d (where a x + b y + c z + d > 0), inside:FILE (a closed surface in the input's
-    /// unit), group:NAME (a group, material or #rrggbb colour of the input), or not: before one of these. May be repeated. Default: what the
+    /// unit), group:NAME (a group, material or #rrggbb colour of the input), shell:MM (less deep beneath the surface), or not: before one of these. May be repeated. Default: what the
     /// mesh file holds. With NAME= before it the nodes are a support group, which a host moves and lets go apart; of several, a node is the first one's.
     #[arg(
         long,

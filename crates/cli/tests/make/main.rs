@@ -212,7 +212,19 @@ fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
     let (surface, out) = (folder.path().join("organ.obj"), folder.path().join("organ"));
     plain(&surface);
     let law = ["--law", "mooney-rivlin:1", "--relaxation", "0.3,0.1,0.3,1"];
-    let asked = [&law[..], &hanging::OPTIONS, &["--tools", "press,lift"]].concat();
+    let rind = [
+        "--region",
+        "rind=plane:0,0,1,-12",
+        "--material",
+        "rind=cortex",
+    ];
+    let asked = [
+        &law[..],
+        &rind,
+        &hanging::OPTIONS,
+        &["--tools", "press,lift"],
+    ]
+    .concat();
     let output = command(&surface, &out, &[&HELD[..], &asked].concat())
         .output()
         .unwrap();
@@ -225,7 +237,16 @@ fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
     let law = serde_json::json!({"name": "mooney-rivlin", "c01_share": 1.0});
     assert_eq!(manifest["material"]["law"], law);
     let requires = manifest["requires"].as_array().unwrap();
-    for part in ["law", "relaxation"] {
+    let rind = &manifest["laws"][0];
+    assert_eq!(
+        (&rind["name"], &rind["law"]["name"]),
+        (&"rind".into(), &"ogden".into())
+    );
+    assert!(
+        rind["source"].as_str().unwrap().starts_with("10.1016/"),
+        "{rind}"
+    );
+    for part in ["law", "laws", "relaxation"] {
         assert!(requires.iter().any(|name| name == part), "{requires:?}");
     }
     relaxing::falls_as_the_solvers(&out);
@@ -234,6 +255,7 @@ fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
     let certificate = read("certificate.json");
     let share = certificate["contact"]["share_of_linear"].as_f64().unwrap();
     assert!(share < 0.05, "{certificate:#}");
+    assert_eq!(certificate["envelope"]["laws"], manifest["laws"]);
 
     // So are the tools that it was asked to be good for.
     let tools = certificate["tools"].as_array().unwrap();

@@ -67,6 +67,46 @@ fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
         &["poisson"],
     );
 
+    let rind = ["--region", "rind=plane:0,0,1,-12"];
+    for (more, words) in [
+        (
+            &rind[..],
+            "region `rind` has no law; give --material rind=LAW",
+        ),
+        (
+            &["--material", "rind=cortex"],
+            "there is no region of that name",
+        ),
+        (&["--material", "rind=spleen"], "upt materials"),
+        (&["--material", "rind=ogden:-0.157,-18"], "not kPa"),
+        (
+            &["--material", "rind=ogden:157,-18"],
+            "region `rind`: law.terms[0]",
+        ),
+        (&["--material", "stone"], "--material is `stone`"),
+        (
+            &[
+                "--region",
+                "rind=ball:900,0,0,5",
+                "--material",
+                "rind=cortex",
+            ],
+            "no tetrahedron lies in region `rind`",
+        ),
+        (
+            &[
+                rind[0],
+                rind[1],
+                "--material",
+                "rind=cortex",
+                "--stiffness",
+                "all=2",
+            ],
+            "region `rind` has a law with a modulus of its own",
+        ),
+    ] {
+        has(refused(&good, &[&HELD, more].concat()), &[words]);
+    }
     has(
         refused(&good, &[HELD[0], HELD[1], "--gravity", "0,-9.81"]),
         &["--gravity", "three numbers"],

@@ -102,7 +102,7 @@ impl Mesh {
                 Err(_) => Vec::new(),
             },
             regions: match metadata.get("laws") {
-                Some(text) => serde_json::from_str(text)
+                Some(text) => elements::Region::list(text)
                     .map_err(|error| field("laws", format!("is no list of regions: {error}")))?,
                 None => Vec::new(),
             },

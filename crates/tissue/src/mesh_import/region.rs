@@ -2,14 +2,15 @@
 //! a part that the mesh's file names.
 
 use super::labels::{Group, sorted};
-use super::{Ball, ImportError, SurfaceDistance, closed_surface, space, surface_files};
+use super::{Ball, ImportError, RawSurface, SurfaceDistance, closed_surface, space, surface_files};
 use crate::mesh::{Mesh, face_centroid};
 use crate::stuffing::Field;
+use std::cell::OnceCell;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// How a part is written: `ball:x,y,z,r`, `plane:a,b,c,d`, `inside:FILE`, `group:NAME`, `all`, `not:` and one of them.
+/// How a part is written: `ball:x,y,z,r`, `plane:a,b,c,d`, `inside:FILE`, `group:NAME`, `shell:MM`, `all`, `not:` and one of them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Region {
     Ball(Ball),
@@ -19,6 +20,8 @@ pub enum Region {
     Inside(PathBuf),
     /// What the mesh's own file calls so ([`super::Labels`]).
     Group(String),
+    /// Less than so many millimetres from the body's own surface.
+    Shell(f64),
     All,
     Not(Box<Region>),
 }
@@ -50,9 +53,15 @@ impl FromStr for Region {
             }
             "inside" if !rest.is_empty() => Ok(Self::Inside(rest.into())),
             "group" if !rest.trim().is_empty() => Ok(Self::Group(rest.trim().into())),
+            "shell" => match rest.trim().parse::<f64>() {
+                Ok(depth) if depth.is_finite() && depth > 0.0 => Ok(Self::Shell(depth)),
+                _ => Err(format!(
+                    "`{text}` is not a shell; write shell:MM with a depth above 0 mm"
+                )),
+            },
             "not" => Ok(Self::Not(Box::new(rest.parse()?))),
             _ => Err(format!(
-                "`{text}` is not a region; write ball:x,y,z,r, plane:a,b,c,d, inside:FILE, group:NAME, all, or not: before one of these"
+                "`{text}` is not a region; write ball:x,y,z,r, plane:a,b,c,d, inside:FILE, group:NAME, shell:MM, all, or not: before one of these"
             )),
         }
     }
@@ -68,6 +77,7 @@ impl std::fmt::Display for Region {
             Self::Plane([a, b, c, d]) => write!(f, "plane:{a},{b},{c},{d}"),
             Self::Inside(path) => write!(f, "inside:{}", path.display()),
             Self::Group(name) => write!(f, "group:{name}"),
+            Self::Shell(depth) => write!(f, "shell:{depth}"),
             Self::All => write!(f, "all"),
             Self::Not(region) => write!(f, "not:{region}"),
         }
@@ -80,6 +90,8 @@ pub enum Opened {
     Plane([f64; 4]),
     Inside(Box<SurfaceDistance>),
     Group(Box<Group>),
+    /// With the surface of the body that was asked first.
+    Shell(f64, OnceCell<Option<Box<SurfaceDistance>>>),
     All,
     Not(Box<Opened>),
 }
@@ -93,6 +105,7 @@ impl Region {
         Ok(match self {
             Self::Ball(ball) => Opened::Ball(*ball),
             Self::Plane(plane) => Opened::Plane(*plane),
+            Self::Shell(depth) => Opened::Shell(*depth, OnceCell::new()),
             Self::All => Opened::All,
             Self::Not(region) => Opened::Not(Box::new(region.open(input, scale)?)),
             Self::Group(name) => {
@@ -129,7 +142,7 @@ enum Kind {
 
 impl Opened {
     /// Whether a point, mm, belongs to it.
-    fn holds(&self, point: [f64; 3], kind: Kind) -> bool {
+    fn holds(&self, mesh: &Mesh, point: [f64; 3], kind: Kind) -> bool {
         match self {
             Self::Ball(ball) => ball.holds(point),
             Self::Plane([a, b, c, d]) => a * point[0] + b * point[1] + c * point[2] + d > 0.0,
@@ -138,8 +151,13 @@ impl Opened {
                 Kind::Face => group.holds_by_face(point) || group.holds_by_corner(point),
                 Kind::Tet => group.holds_tet(point),
             },
+            Self::Shell(depth, surface) => {
+                let made = surface.get_or_init(|| surface_of(mesh).map(Box::new));
+                made.as_ref()
+                    .is_some_and(|surface| surface.value(point).abs() < *depth)
+            }
             Self::All => true,
-            Self::Not(region) => !region.holds(point, kind),
+            Self::Not(region) => !region.holds(mesh, point, kind),
         }
     }
 
@@ -147,7 +165,7 @@ impl Opened {
     fn faces(&self, mesh: &Mesh) -> Vec<bool> {
         let by_centroid = |region: &Self| -> Vec<bool> {
             let centroid = |&face: &[u32; 3]| face_centroid(&mesh.positions, face);
-            let holds = |face: &[u32; 3]| region.holds(centroid(face), Kind::Face);
+            let holds = |face: &[u32; 3]| region.holds(mesh, centroid(face), Kind::Face);
             mesh.surface.iter().map(holds).collect()
         };
         match self {
@@ -190,9 +208,20 @@ impl Opened {
                 }
                 flags
             }
-            region => positions().map(|p| region.holds(p, Kind::Tet)).collect(),
+            region => positions()
+                .map(|p| region.holds(mesh, p, Kind::Tet))
+                .collect(),
         }
     }
+}
+
+/// The body's surface; none where it is not closed.
+fn surface_of(mesh: &Mesh) -> Option<SurfaceDistance> {
+    let surface = RawSurface {
+        positions: mesh.positions.iter().map(|p| p.map(f64::from)).collect(),
+        faces: mesh.surface.clone(),
+    };
+    SurfaceDistance::new(surface).ok()
 }
 
 /// Nodes in any of the regions, ascending.
@@ -217,7 +246,7 @@ pub fn tets_in(mesh: &Mesh, region: &Opened) -> Vec<usize> {
         let corners = mesh.tets[row].map(|node| mesh.positions[node as usize].map(f64::from));
         let centre: [f64; 3] =
             std::array::from_fn(|k| corners.iter().map(|p| p[k]).sum::<f64>() / 4.0);
-        region.holds(centre, Kind::Tet)
+        region.holds(mesh, centre, Kind::Tet)
     };
     (0..mesh.tets.len()).filter(holds).collect()
 }

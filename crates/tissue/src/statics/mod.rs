@@ -86,7 +86,6 @@ impl StaticSolver {
         material: Material,
         columns: &FilePath,
     ) -> Result<Self, StaticsError> {
-        mesh.check_laws(&material)?;
         let domain = ContactDomain::new(mesh, boundary)?;
         let columns =
             ColumnsFile::open(columns, mesh, boundary, material.young_pa, material.poisson)?;
