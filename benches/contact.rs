@@ -90,8 +90,14 @@ fn forces(positions: &[f32], tets: &[u32], displacement: &[f32]) {
             .map(|i| 40 + i % side + 90 * (40 + i / side) + 3 * 90 * 90)
             .collect();
         let moduli = elements::Material::default().moduli();
-        let mut forces = ReactionForces::new(positions, tets, &[], &nodes, moduli)
-            .expect("memory for the elements");
+        let body = elements::Tetrahedra {
+            positions: positions.as_chunks().0,
+            tets: tets.as_chunks().0,
+            stiffness: &[],
+            laws: elements::Laws::default(),
+        };
+        let mut forces =
+            ReactionForces::new(body, &nodes, moduli).expect("memory for the elements");
         let mut out = vec![0.0; 3 * nodes.len()];
         let seconds = medians(&mut [Box::new(|| {
             forces

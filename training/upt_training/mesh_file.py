@@ -40,7 +40,7 @@ class Mesh:
 
     @property
     def sha256(self) -> str:
-        """The mesh hash: SHA-256 of the bytes of positions, tets, fixed, supported and, if any, stiffness, region and laws."""
+        """The mesh hash: SHA-256 of positions, tets, fixed, supported and, if any, stiffness, region and laws."""
         digest = hashlib.sha256()
         for array in (self.positions, self.tets, self.fixed, self.supported, self.stiffness):
             digest.update(np.ascontiguousarray(array).tobytes())
@@ -115,7 +115,9 @@ def load_mesh(path: Path | str) -> Mesh:
         raise InputError(f"{path}: stiffness must hold a finite positive number for each of the {len(mesh.tets)} tets")
     laws = json.loads(metadata.get("laws", "[]"))
     if len(region) and (len(region) != len(mesh.tets) or region.min() < 0 or region.max() > len(laws)):
-        raise InputError(f"{path}: region must hold 0 to {len(laws)}, the number of laws, for each of the {len(mesh.tets)} tets")
+        raise InputError(
+            f"{path}: region must hold 0 to {len(laws)}, the number of laws, for each of the {len(mesh.tets)} tets"
+        )
     for name in ("tets", "surface", "fixed", "supported"):
         array = getattr(mesh, name)
         if array.size and (array.min() < 0 or array.max() >= mesh.node_count):

@@ -12,6 +12,7 @@ pub mod limits;
 mod maker;
 mod manifest;
 mod mesh;
+mod mesh_laws;
 mod node_set;
 mod parse;
 mod place;

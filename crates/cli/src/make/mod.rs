@@ -18,6 +18,7 @@ mod fixed;
 mod gravity;
 mod laws;
 mod learn;
+mod material;
 mod options;
 mod patches;
 mod projected;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::fixed::Fixed;
 use super::gravity::{Gravity, gravity};
-use super::laws::{self, Choice};
+use super::material::{self, Choice};
 use anyhow::{Result, bail};
 use clap::Args;
 use elements::{Law, Material, Relaxation};
@@ -324,7 +324,7 @@ impl Options {
             "boundary": self.boundary.as_str(), "fixed": texts(&self.fixed),
             "pressure": texts(&self.pressure), "domain": texts(&self.domain), "nodes": self.nodes, "gravity": self.gravity.map(|own| own.0), "unload": self.unload,
             "part": self.part, "label": self.label, "refill": self.refill,
-            "material": texts(&self.material), "region": texts(&self.region), "law": laws::words(&self.law), "relaxation": self.relaxation.to_string(), "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
+            "material": texts(&self.material), "region": texts(&self.region), "law": material::words(&self.law), "relaxation": self.relaxation.to_string(), "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools, "tool_scale": self.sizes.tool_scale,
         })
     }
