@@ -662,6 +662,29 @@ public:
   upt_status restore(span<const std::uint8_t> bytes) {
     return check(upt_scene_restore(handle_, bytes.data(), bytes.size()));
   }
+  /// Begins to record what the scene is given, for `upt replay --verify`, with a hash after every
+  /// so many steps; 0 ends the recording.
+  upt_status record(std::uint32_t every = 1) { return check(upt_scene_record(handle_, every)); }
+  /// Adds to out the lines of the recording that were not taken before; together they make the
+  /// file.
+  upt_status take_record(std::string &out) {
+    const std::size_t before = out.size();
+    std::uint64_t needed = 0;
+    upt_status status = upt_scene_take_record(handle_, nullptr, 0, &needed);
+    // A step in flight may add a line in between.
+    while (status == UPT_OK && needed > 0) {
+      const std::uint64_t room = needed;
+      out.resize(before + static_cast<std::size_t>(room));
+      status = upt_scene_take_record(handle_, reinterpret_cast<std::uint8_t *>(&out[before]), room,
+                                     &needed);
+      if (status == UPT_OK || needed <= room) {
+        break;
+      }
+      status = UPT_OK;
+    }
+    out.resize(before + (status == UPT_OK ? static_cast<std::size_t>(needed) : 0));
+    return check(status);
+  }
 
 #ifndef UPT_NO_EXCEPTIONS
   upt_scene_stats stats() const {

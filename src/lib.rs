@@ -67,6 +67,8 @@ pub mod onnx;
 #[doc(hidden)]
 pub mod options;
 #[doc(hidden)]
+pub mod replay;
+#[doc(hidden)]
 pub mod scene;
 #[doc(hidden)]
 pub mod stats;

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use serde::{Deserialize, Serialize};
+
 pub use crate::bundle::limits::*;
 
 /// Where a stage's graph runs (values of `UPT_PROVIDER_*`).
@@ -39,7 +41,8 @@ impl Provider {
 }
 
 /// What runs the decoder of a `upt` bundle (values of `UPT_KERNEL_*`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[repr(i32)]
 pub enum DecoderKernel {
     /// The native kernel on the CPU, [`DecoderKernel::Resident`] on a device.
@@ -53,7 +56,8 @@ pub enum DecoderKernel {
 }
 
 /// What happens when the guard refuses a state (values of `UPT_GUARD_*`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[repr(i32)]
 pub enum GuardPolicy {
     /// Keep the last good state and return [`crate::Error::Guard`]; without contact, where no later call could do
@@ -112,7 +116,8 @@ impl UserStream {
 }
 
 /// Who makes a step of a `upt` bundle (values of `UPT_STEP_*`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[repr(i32)]
 pub enum StepPath {
     /// [`StepPath::Split`] on the CPU provider, [`StepPath::Measured`] on a device.
@@ -215,7 +220,8 @@ pub struct SceneOptions {
 }
 
 /// How many corrections a step gets while there is contact.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Corrections {
     /// As many as the bundle recommends; none where it has no tables for them.
     #[default]

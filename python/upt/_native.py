@@ -1334,4 +1334,6 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_read_timing": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_save": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_restore": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_record": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32]),
+    "upt_scene_take_record": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
 }

@@ -2,109 +2,92 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
+import ctypes
 import os
-from collections.abc import Sequence
 from types import TracebackType
-from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
+from upt._library import check, lib
+from upt._native import Status
 
-from upt._arrays import Floats
-from upt._native import Cut, Mode, SceneOptions, Shape
-from upt.instrument import Instrument
-from upt.loads import Loads
-from upt.model import Model
-from upt.scene import Scene
 
-_VERSION = 1
-_OPTIONS = ("step_s", "damping_per_s", "corrections", "substeps")
+class Recorded:
+    """What a scene records of itself: `Scene` has it. `upt.Recorder` writes it to a file."""
+
+    _handle: int | None
+
+    def record(self, every: int = 1) -> None:
+        """Begins to record what the scene is given; `end_record` ends it.
+
+        Args:
+            every: after how many steps the hash of what `read` gives is written, 1 or more.
+
+        Raises:
+            upt.StateError: a recording is on, or the last one has not been taken.
+            upt.UnsupportedError: the scene has a budget of time or a mesh of its own.
+        """
+        if every < 1:
+            raise ValueError(f"every is {every}; give 1 or more")
+        check(lib.upt_scene_record(self._handle, every))
+
+    def end_record(self) -> None:
+        """Ends the recording; its last lines are there for `take_record`."""
+        check(lib.upt_scene_record(self._handle, 0))
+
+    def take_record(self) -> bytes:
+        """The lines of the recording that were not taken before, UTF-8. Also while a step is in flight."""
+        needed = ctypes.c_uint64()
+        check(lib.upt_scene_take_record(self._handle, None, 0, ctypes.byref(needed)))
+        while needed.value:
+            room = ctypes.create_string_buffer(needed.value)
+            status = lib.upt_scene_take_record(self._handle, room, len(room), ctypes.byref(needed))
+            # A step in flight may have added a line.
+            if status == Status.ERR_ARGUMENT and needed.value > len(room):
+                continue
+            check(status)
+            return room.raw[: needed.value]
+        return b""
 
 
 class Recorder:
-    """A new scene whose steps and cuts go to a file of JSON lines (docs/reference/formats.md) as they are made.
+    """Writes to a file what a scene is given, by all of its methods, as JSON lines (docs/reference/formats.md).
 
         model = upt.Model(upt.bundle("liver-coarse"), portable=True)
-        with upt.Recorder(model, "exam.replay", step_s=0.02) as recorder:
-            u = recorder.step([probe])
+        scene = model.scene(step_s=0.02, corrections=3)
+        with upt.Recorder(scene, "exam.replay"):
+            scene.step([probe])
 
     Open the model with `portable=True`: only then do other processors compute the same bits. Without the end that
     `close` writes a file counts as cut off.
 
     Args:
-        model: what the scene is made of.
+        scene: what is recorded.
         path: the file, which is written over.
-        every: after how many steps the hash of all displacements is written, 1 or more.
-        options: fields of `upt.SceneOptions` that a replay can hold: step_s, damping_per_s, corrections (without
-            a budget, which counts by the clock), substeps.
+        every: after how many steps the hash of the displacements is written, 1 or more.
     """
 
-    def __init__(self, model: Model, path: str | os.PathLike[str], *, every: int = 1, **options: Any) -> None:
-        if every < 1:
-            raise ValueError(f"every is {every}; give 1 or more")
-        for name in options:
-            if name not in _OPTIONS:
-                raise TypeError(f"a replay cannot hold the option {name!r}; it can hold {', '.join(_OPTIONS)}")
-        fields = SceneOptions(**options)
-        corrections = fields.corrections
-        if corrections.budget_us:
-            raise ValueError(
-                "corrections: a replay cannot hold a budget, which counts by the clock; give a target or a count"
-            )
-        self.scene: Scene = model.scene(**options)
-        described = model.describe()
-        header = {
-            "upt_replay": _VERSION,
-            "bundle": described["name"],
-            "bundle_sha256": described["bundle_sha256"],
-            "portable": str(described["instruction_set"]).startswith("Portable"),
-            "scene": {
-                "step_s": fields.step_s,
-                "damping_per_s": fields.damping_per_s,
-                "corrections": {
-                    "mode": corrections.mode.name.lower(),
-                    "count": corrections.count,
-                    "target_mm": corrections.target_mm,
-                },
-                "substeps": fields.substeps,
-            },
-        }
-        self._every, self._steps, self._lines = every, 0, 0
-        self._file = open(path, "w", encoding="utf-8")
-        self._write(header)
+    def __init__(self, scene: Recorded, path: str | os.PathLike[str], *, every: int = 1) -> None:
+        self.scene = scene
+        file = open(path, "wb")
+        try:
+            scene.record(every)
+        except BaseException:
+            file.close()
+            raise
+        self._file = file
 
-    def step(self, instruments: Sequence[Instrument] = (), *, loads: Loads | None = None) -> Floats:
-        """A step as `Scene.step` makes it, of instruments (no hulls) and gravity; other loads are refused."""
-        if loads is not None and loads != Loads(gravity=loads.gravity, gravity_at_rest=loads.gravity_at_rest):
-            raise ValueError("loads: a replay can hold gravity, and no other load")
-        given: dict[str, Any] = {"instruments": [_fields(tool) for tool in instruments]}
-        if loads is not None:
-            given["gravity"] = _exact(loads.gravity)
-            given["gravity_at_rest"] = _exact(loads.gravity_at_rest)
-        field = self.scene.step(instruments, loads=loads)
-        self._steps += 1
-        if self._steps % self._every == 0:
-            given["sha256"] = hashlib.sha256(field.astype("<f4").tobytes()).hexdigest()
-        self._lines += 1
-        self._write({"step": given})
-        return field
-
-    def cut(self, poses: ArrayLike, stroke: int = 0) -> Cut:
-        """A cut as `Scene.cut` makes it."""
-        path = np.asarray(poses, np.float32)
-        made = self.scene.cut(path, stroke)
-        self._lines += 1
-        rows = [_exact(point) for point in path.reshape(-1, 3)]
-        self._write({"cut": {"stroke": stroke, "points": path.shape[1], "poses": rows}})
-        return made
+    def flush(self) -> None:
+        """Writes what there is, so that a long session does not fill the memory and outlives a crash."""
+        self._file.write(self.scene.take_record())
+        self._file.flush()
 
     def close(self) -> None:
-        """Writes the end of the file."""
+        """Ends the recording and the file."""
         if not self._file.closed:
-            self._write({"end": self._lines})
-            self._file.close()
+            try:
+                self.scene.end_record()
+                self.flush()
+            finally:
+                self._file.close()
 
     def __enter__(self) -> Recorder:
         return self
@@ -113,27 +96,3 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    def _write(self, line: dict[str, Any]) -> None:
-        self._file.write(json.dumps(line) + "\n")
-
-
-def _exact(values: Any) -> list[float]:
-    """The numbers that the library gets, float32."""
-    return [float(value) for value in np.asarray(values, np.float32)]
-
-
-def _fields(tool: Instrument) -> dict[str, Any]:
-    record = tool.record()
-    if record.shape == Shape.HULL:
-        raise ValueError("instruments: a replay cannot hold a hull")
-    return {
-        "shape": record.shape.name.lower(),
-        "position": list(record.position),
-        "rotation": list(record.rotation),
-        "half_extents": list(record.half_extents),
-        "radius": record.radius,
-        "mode": "grasp" if record.mode == Mode.GRASP else "slide",
-        "friction": record.friction,
-        "tear_off_mn": record.tear_off_mn,
-    }

@@ -30,6 +30,7 @@ from upt._native import (
 from upt.cuts import Cuts
 from upt.instrument import Instrument, records
 from upt.loads import Loads
+from upt.replay import Recorded
 from upt.ties import Ties
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ class OpenModel(Protocol):
         ...
 
 
-class Scene(Cuts, Ties):
+class Scene(Cuts, Recorded, Ties):
     """One deforming body, made by `Model.scene`.
 
     Arrays are float32, `[n, 3]`, mm; node indices are uint32. An input that is C-contiguous and of this type is not

@@ -1,5 +1,6 @@
 //! Operations that change the body of a scene.
 
+use std::borrow::Cow;
 use std::sync::MutexGuard;
 
 use ::contact::Vector;
@@ -11,6 +12,8 @@ use super::presenter::Presenters;
 use super::shared::lock;
 use crate::contact::Tool;
 use crate::error::Result;
+use crate::replay::Recorder;
+use crate::replay::lines::{self, Line};
 
 /// What an operation did to the body.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -83,7 +86,19 @@ impl Scene {
     ) -> Result<Cut> {
         let sweep = sweep(points, poses)?;
         let _frames = self.hold_frames(true)?;
-        let change = self.with(|core, published| {
+        let line = Line::Cut(lines::Cut {
+            stroke,
+            points,
+            poses: Cow::Borrowed(poses),
+            blade: (*blade != Blade::default()).then_some(lines::Blade {
+                fracture_energy: blade.energy,
+                threshold: blade.threshold_mn,
+                pushed: blade.pushed_mn,
+                ahead: blade.ahead,
+            }),
+        });
+        let line = |recorder: &mut Recorder| recorder.open(&line);
+        let change = self.told(line, |core, published| {
             core.change(published, |body, at| {
                 body.cut_with(blade, &sweep, stroke, at)
             })
@@ -102,7 +117,14 @@ impl Scene {
             f64::from(-tool.body.nearest_at(&tool.pose, at).distance)
         };
         let _frames = self.hold_frames(true)?;
-        let change = self.with(|core, published| {
+        let line = |recorder: &mut Recorder| {
+            let instrument = recorder.instrument(tool)?;
+            recorder.open(&Line::Remove(lines::Remove {
+                instrument,
+                most_mm3,
+            }))
+        };
+        let change = self.told(line, |core, published| {
             core.change(published, |body, at| {
                 body.remove(depth, f64::from(most_mm3), at)
             })
@@ -116,7 +138,12 @@ impl Scene {
     /// As [`Scene::cut`]; [`crate::Error::Argument`] for a factor that takes an element out of 0.001 to 1000 times its own.
     pub fn scale_stiffness(&self, elements: &[u32], factor: f32) -> Result<Cut> {
         let _frames = self.hold_frames(true)?;
-        let change = self.with(|core, published| {
+        let line = Line::ScaleStiffness(lines::Stiffness {
+            elements: Cow::Borrowed(elements),
+            factor,
+        });
+        let line = |recorder: &mut Recorder| recorder.open(&line);
+        let change = self.told(line, |core, published| {
             core.change(published, |body, _| body.scale_stiffness(elements, factor))
         });
         change.map(Cut::from)
@@ -128,7 +155,8 @@ impl Scene {
     /// As [`Scene::cut`].
     pub fn drop_fragments(&self) -> Result<Vec<f32>> {
         let _frames = self.hold_frames(true)?;
-        self.with(|core, published| {
+        let line = |recorder: &mut Recorder| recorder.open(&Line::DropFragments {});
+        self.told(line, |core, published| {
             let Some(cut) = &core.cut else {
                 return Ok(Vec::new());
             };

@@ -40,6 +40,8 @@ mod publish;
 mod published;
 mod reaction;
 mod read;
+mod record;
+mod recording;
 mod reduced;
 mod region;
 mod shared;
@@ -56,6 +58,7 @@ mod upt;
 mod verdict;
 mod worker;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -79,6 +82,9 @@ use crate::memory;
 use crate::model::{KindModel, Model};
 use crate::options::SceneOptions;
 use crate::output::Output;
+use crate::replay::Recorder;
+use crate::replay::base64::Bytes;
+use crate::replay::lines::Line;
 use build::build;
 use core::{Core, lock_read};
 use points::AttachedPoints;
@@ -187,7 +193,8 @@ impl Scene {
     /// Back to rest; region and points stay.
     pub fn reset(&self) -> Result<()> {
         let _frames = self.hold_frames(lock_read(&self.shared.published).cut.is_some())?;
-        self.with(|core, published| {
+        let line = |recorder: &mut Recorder| recorder.open(&Line::Reset {});
+        self.told(line, |core, published| {
             core.reset(published)?;
             self.tools.reset();
             Ok(())
@@ -227,7 +234,8 @@ impl Scene {
 
     /// [`Scene::step`] into memory that need not be initialised.
     pub(crate) fn step_to(&self, input: StepInput<'_>, out: Option<Output<'_, f32>>) -> Result<()> {
-        self.with(|core, published| core.step(published, input, out))
+        let line = |recorder: &mut Recorder| record::step(recorder, &input);
+        self.told(line, |core, published| core.step(published, input, out))
     }
 
     /// Restricts output to these nodes (any order); `None` is all nodes. Both published states are decoded for the new
@@ -245,7 +253,9 @@ impl Scene {
     /// # upt::Result::Ok(())
     /// ```
     pub fn set_region(&self, nodes: Option<&[u32]>) -> Result<()> {
-        self.with(|core, published| {
+        let line = Line::Region(nodes.map(Cow::Borrowed));
+        let line = |recorder: &mut Recorder| recorder.open(&line);
+        self.told(line, |core, published| {
             if let Some(nodes) = nodes {
                 check_nodes(nodes, core.mesh.node_count())?;
             }
@@ -356,7 +366,9 @@ impl Scene {
     pub fn restore(&self, bytes: &[u8]) -> Result<()> {
         let is_cut = lock_read(&self.shared.published).cut.is_some();
         let _frames = self.hold_frames(is_cut || snapshot::has_body(bytes))?;
-        self.with(|core, published| core.restore(published, bytes))
+        let line = Line::Restore(Bytes(Cow::Borrowed(bytes)));
+        let line = |recorder: &mut Recorder| recorder.open(&line);
+        self.told(line, |core, published| core.restore(published, bytes))
     }
 }
 

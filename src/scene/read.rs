@@ -75,7 +75,9 @@ impl Scene {
     pub fn stats(&self) -> SceneStats {
         let mut stats = lock_read(&self.shared.published).stats;
         stats.poisoned = self.shared.is_poisoned();
-        stats.memory_bytes += (self.presenter_bytes() + self.surface_bytes()) as u64;
+        stats.memory_bytes += (self.presenter_bytes()
+            + self.surface_bytes()
+            + self.shared.record.held_bytes()) as u64;
         stats
     }
 

@@ -7,6 +7,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, TryLockError};
 use super::StepInput;
 use super::core::Core;
 use super::published::Published;
+use super::record::{self, Record};
 use crate::error::{Error, Result};
 
 /// Core, published states, and whether a panic was caught.
@@ -15,6 +16,8 @@ pub struct Shared {
     /// The readable part.
     pub published: RwLock<Published>,
     poisoned: AtomicBool,
+    /// Locked by who has the core, and by who takes the lines.
+    pub record: Record,
 }
 
 impl Shared {
@@ -24,6 +27,7 @@ impl Shared {
             core: Mutex::new(core),
             published: RwLock::new(published),
             poisoned: AtomicBool::new(false),
+            record: Record::default(),
         }
     }
 
@@ -70,7 +74,11 @@ impl Shared {
     /// A step of the scene's worker, which waits for a call in progress.
     pub fn step_blocking(&self, input: StepInput<'_>) -> Result<()> {
         let core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
-        self.guarded(core, |core, published| core.step(published, input, None))
+        self.guarded(core, |core, published| {
+            let line = |recorder: &mut _| record::step(recorder, &input);
+            let call = || core.step(published, input, None);
+            self.record.told(published, line, call)
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Calls on a scene.
 
-use std::ptr::null;
+use std::ptr::{null, null_mut};
 
 use upt::ffi::*;
 
@@ -175,6 +175,28 @@ impl World<'_> {
                         self.snapshot = bytes[..needed as usize].to_vec();
                     }
                     ("upt_scene_save", status)
+                }
+                Function::Record => {
+                    let every = (call.seed % 3) as u32;
+                    ("upt_scene_record", upt_scene_record(scene, every))
+                }
+                Function::TakeRecord => {
+                    let mut needed = [0u64];
+                    let asked = upt_scene_take_record(scene, null_mut(), 0, &mut needed[0]);
+                    assert!(asked == UPT_OK || needed[0] == 0);
+                    let (capacity, room) = count(needed[0] as usize, call.size);
+                    let mut lines = vec![7u8; room];
+                    let status = upt_scene_take_record(
+                        scene,
+                        pointer_mut(&mut lines, call, 0),
+                        capacity,
+                        pointer_mut(&mut needed, call, 1),
+                    );
+                    let whole = &lines[..needed[0].min(room as u64) as usize];
+                    let is_text = whole.is_empty() || whole.ends_with(b"\n");
+                    let is_untouched = lines.iter().all(|byte| *byte == 7);
+                    assert!(is_untouched || status == UPT_OK && is_text);
+                    ("upt_scene_take_record", status)
                 }
                 Function::Restore => {
                     let mut bytes = self.snapshot.clone();

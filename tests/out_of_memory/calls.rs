@@ -20,6 +20,7 @@ pub struct Rig {
     domain: Vec<u32>,
     pub tools: [upt_instrument; 2],
     snapshot: Vec<u8>,
+    pub is_recorded: bool,
     /// Bytes that the last call gave.
     pub given: Vec<u8>,
 }
@@ -45,6 +46,7 @@ impl Rig {
             domain: Vec::new(),
             tools: [tool; 2],
             snapshot: Vec::new(),
+            is_recorded: false,
             given: Vec::new(),
         }
     }

@@ -1,5 +1,7 @@
 //! Calls that change the body of a scene, and what they leave.
 
+use std::ptr::null_mut;
+
 use upt::ffi::*;
 
 use crate::allocator::counted;
@@ -29,6 +31,29 @@ impl Rig {
         self.operate(|scene, out| unsafe {
             upt_scene_scale_stiffness(scene, [0, 1].as_ptr(), 2, 2.0, out)
         })
+    }
+
+    pub fn record(&mut self) -> i32 {
+        let every = u32::from(!std::mem::replace(&mut self.is_recorded, true));
+        let status = counted(|| unsafe { upt_scene_record(self.scene, every) });
+        if status != UPT_OK {
+            // The call is made again.
+            self.is_recorded = every == 0;
+        }
+        self.give(status, &[every])
+    }
+
+    /// The lines of all that succeeded.
+    pub fn take_record(&mut self) -> i32 {
+        let mut needed = 0;
+        let asked =
+            counted(|| unsafe { upt_scene_take_record(self.scene, null_mut(), 0, &mut needed) });
+        assert_eq!(asked, UPT_OK);
+        let mut lines = vec![0u8; needed as usize];
+        let room = lines.as_mut_ptr();
+        let status =
+            counted(|| unsafe { upt_scene_take_record(self.scene, room, needed, &mut needed) });
+        self.give(status, &lines)
     }
 
     /// The surface, and where its vertices are.

@@ -54,6 +54,7 @@ pub const CUT: &[Call] = &[
     CREATE,
     ("a first step with two tools", |rig| rig.drive(0.5)),
     ("upt_scene_update_surface", Rig::surface),
+    ("upt_scene_record", Rig::record),
     ("upt_scene_cut", Rig::cut),
     ("the surface of a cut", Rig::surface),
     ("a step of a cut body", |rig| rig.drive(1.5)),
@@ -62,6 +63,9 @@ pub const CUT: &[Call] = &[
     ("upt_scene_scale_stiffness", Rig::stiffen),
     ("upt_scene_restore of a cut body", Rig::restore),
     ("upt_scene_reset of a cut body", Rig::reset),
+    ("a recorded step", |rig| rig.drive(0.5)),
+    ("the end of a recording", Rig::record),
+    ("upt_scene_take_record", Rig::take_record),
     ("a step after a reset", |rig| rig.drive(1.0)),
 ];
 

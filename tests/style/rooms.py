@@ -13,7 +13,7 @@ from structure.rust import ROOT, Crate
 
 ORDER = """
     features options stats library graph guard onnx
-    envelope forces instrument haptics
+    envelope forces instrument haptics replay
     model scene arrays ffi
 """.split()
 

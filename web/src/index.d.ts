@@ -212,6 +212,10 @@ export interface Scene {
   /** State and body. */
   save(): Uint8Array;
   restore(snapshot: Uint8Array): void;
+  /** Begins to record what the scene is given, for `upt replay --verify`, with a hash after every so many steps (1); 0 ends it. */
+  record(every?: number): void;
+  /** The lines of the recording that were not taken before; together they make the file. */
+  takeRecord(): string;
   reset(): void;
   close(): void;
 }

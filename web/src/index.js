@@ -293,6 +293,20 @@ class Scene {
     return this.#filled(this.#points, (at, floats) => this.#module.run("upt_scene_read_points", this.handle, at, floats));
   }
 
+  /** Begins to record what the scene is given, for `upt replay --verify`, with a hash after every so many steps; 0 ends it. */
+  record(every = 1) {
+    this.#module.run("upt_scene_record", this.handle, every);
+  }
+
+  /** The lines of the recording that were not taken before; together they make the file. */
+  takeRecord() {
+    const size = this.#module.out("upt_scene_take_record", this.handle, 0, 0n);
+    return this.#module.withRoom(8 + size, (at) => {
+      this.#module.run("upt_scene_take_record", this.handle, at + 8, BigInt(size), at);
+      return new TextDecoder().decode(this.#module.bytes(at + 8, size));
+    });
+  }
+
   /** Back to rest. */
   reset() {
     this.#module.run("upt_scene_reset", this.handle);

@@ -12,7 +12,7 @@ const BEGIN: &str = "<!-- cargo xtask header: begin -->\n";
 const END: &str = "<!-- cargo xtask header: end -->";
 
 /// Headings of the calls, by the file of `src/ffi/` that holds them.
-const CHAPTERS: [(&str, &str); 14] = [
+const CHAPTERS: [(&str, &str); 15] = [
     ("library.rs", "Library"),
     ("model.rs", "Models"),
     ("scene.rs", "Scenes and steps"),
@@ -27,6 +27,7 @@ const CHAPTERS: [(&str, &str); 14] = [
     ("haptics.rs", "Forces for a hand"),
     ("instrument.rs", "Contact found by geometry, and forces"),
     ("state.rs", "Statistics and snapshots"),
+    ("record.rs", "Recordings"),
 ];
 
 /// Headings of the constants, by prefix.

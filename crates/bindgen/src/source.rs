@@ -9,7 +9,7 @@ use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
 pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
-pub const FILES: [&str; 19] = [
+pub const FILES: [&str; 20] = [
     "../../crates/field/src/status.rs",
     "constants.rs",
     "structs.rs",
@@ -29,6 +29,7 @@ pub const FILES: [&str; 19] = [
     "haptics.rs",
     "instrument.rs",
     "state.rs",
+    "record.rs",
 ];
 
 /// A doc comment's lines.

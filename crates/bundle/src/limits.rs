@@ -1,7 +1,10 @@
 //! What a bundle's fields and a host's options may be: the same bounds for both.
 
+use serde::{Deserialize, Serialize};
+
 /// Arithmetic of the heavy stages (values of `UPT_PRECISION_*`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[repr(i32)]
 pub enum Precision {
     /// Plain float32.

@@ -36,9 +36,17 @@ enum Core {
     Triangles(Arc<Triangles>),
 }
 
+/// The shape that a body was made of. One with lists is shared, so that no clone of a body allocates.
+#[derive(Clone, Debug)]
+enum Origin {
+    Plain(Shape),
+    Listed(Arc<Shape>),
+}
+
 /// A shape ready for queries. Cheap to clone, never changes.
 #[derive(Clone, Debug)]
 pub struct Body {
+    origin: Origin,
     core: Core,
     radius: f32,
     /// It has a corner that is less than [`BLUNT_MM`] thick a millimetre behind.
@@ -69,6 +77,14 @@ impl Body {
             _ => false,
         };
         same && self.radius == other.radius
+    }
+
+    /// The shape that it was made of.
+    pub fn shape(&self) -> &Shape {
+        match &self.origin {
+            Origin::Plain(shape) => shape,
+            Origin::Listed(shape) => shape,
+        }
     }
 
     /// Checks a shape and prepares it.
@@ -126,7 +142,12 @@ impl Body {
             Core::Cuboid { half } => (-*half, *half),
             Core::Triangles(surface) => surface.bounds(),
         };
+        let origin = match shape {
+            Shape::Hull { .. } | Shape::Mesh { .. } => Origin::Listed(Arc::new(shape.clone())),
+            plain => Origin::Plain(plain.clone()),
+        };
         let mut body = Self {
+            origin,
             core,
             radius,
             pointed: false,

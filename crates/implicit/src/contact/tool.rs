@@ -1,6 +1,7 @@
 //! What a host gives: a rigid tool at a pose; and what it gets back of it.
 
 use ::contact::{Body, Pose, Shape, pose};
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::field::INPUT_LIMIT;
@@ -12,7 +13,8 @@ pub const PUT_MM: f32 = 40.0;
 pub const MAX_TOOLS: usize = 64;
 
 /// How a tool holds the tissue.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, HeldBytes)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, HeldBytes, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Mode {
     /// Pushes, with Coulomb friction.
     #[default]

@@ -1,15 +1,22 @@
 //! `upt replay`: what was recorded comes out to the bit, also with other instructions; what was changed or cut off is named.
 
+mod recorded;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn upt(file: &Path, more: &[&str], isa: Option<&str>) -> Output {
+    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../onnx/liver-coarse");
+    of(&bundle, file, more, isa)
+}
+
+fn of(bundle: &Path, file: &Path, more: &[&str], isa: Option<&str>) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_upt"));
     command
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
         .arg("replay")
         .arg(file)
-        .args(["--bundle", "onnx/liver-coarse"])
+        .arg("--bundle")
+        .arg(bundle)
         .args(more);
     if let Some(isa) = isa {
         command.env("UPT_ISA", isa);
@@ -20,7 +27,7 @@ fn upt(file: &Path, more: &[&str], isa: Option<&str>) -> Output {
 /// A ball that goes down at a place of the surface, a cut, and gravity.
 fn inputs() -> String {
     let mut text = String::from(
-        r#"{"upt_replay":1,"bundle":"liver-coarse","portable":true,"scene":{"step_s":0.02,"corrections":{"mode":"count","count":3}}}"#,
+        r#"{"upt_replay":2,"bundle":"liver-coarse","portable":true,"scene":{"step_s":0.02,"corrections":{"fixed":3}}}"#,
     );
     let model = upt::Model::open(
         Path::new("../../onnx/liver-coarse"),
@@ -32,7 +39,7 @@ fn inputs() -> String {
     for t in 0..6 {
         let z = z + 6.0 - t as f32;
         text += &format!(
-            "\n{{\"step\":{{\"instruments\":[{{\"shape\":\"sphere\",\"position\":[{x},{y},{z}],\"radius\":6,\"friction\":0.3}}],\"gravity\":[0,0,-1]}}}}"
+            "\n{{\"step\":{{\"instruments\":[{{\"shape\":{{\"kind\":\"sphere\",\"radius\":6}},\"position\":[{x},{y},{z}],\"friction\":0.3}}],\"loads\":{{\"gravity\":[0,0,-1]}}}}}}"
         );
         if t == 3 {
             let at = |a: f32, n: f32| format!("[{},{},{}]", x + a, y + 9.0, z + n);

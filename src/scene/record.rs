@@ -1,0 +1,151 @@
+//! The recording that a scene may have: each call that changes what later steps compute has its line ([`crate::replay`]).
+
+use std::borrow::Cow;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
+
+use sha2::{Digest, Sha256};
+
+use super::core::lock_read;
+use super::loads::Loads;
+use super::published::Published;
+use super::step_input::{Contact, StepInput};
+use super::support::SupportPose;
+use crate::error::Result;
+use crate::memory;
+use crate::replay::Recorder;
+use crate::replay::drive::Rows;
+use crate::replay::lines::Step;
+use crate::replay::loads::{Loading, Pose, Pressure, Support, Tie};
+
+pub(super) const WHAT: &str = "a recording";
+
+/// The recording of a scene, if there is one.
+#[derive(Default)]
+pub(super) struct Record {
+    /// Whether calls look for it.
+    pub(super) on: AtomicBool,
+    recorder: Mutex<Option<Box<Recorder>>>,
+}
+
+impl Record {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Option<Box<Recorder>>> {
+        self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes a call of which a recording tells with what `line` begins there. Where there is no room for that, nothing is done.
+    pub(super) fn told<T>(
+        &self,
+        published: &RwLock<Published>,
+        line: impl FnOnce(&mut Recorder) -> Result<()>,
+        call: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
+        if !self.on.load(Ordering::Acquire) {
+            return call();
+        }
+        let begun = self
+            .lock()
+            .as_mut()
+            .map(|recorder| line(recorder).inspect_err(|_| recorder.drop_open()));
+        begun.transpose()?;
+        let done = call();
+        if let Some(recorder) = self.lock().as_mut() {
+            match done {
+                Ok(_) => recorder.close(|| digest(published)),
+                Err(_) => recorder.drop_open(),
+            }
+        }
+        done
+    }
+
+    /// Bytes of what no one has taken.
+    pub(super) fn held_bytes(&self) -> usize {
+        self.lock().as_ref().map_or(0, |own| own.held_bytes())
+    }
+}
+
+/// Numbers that are hashed at once.
+const MOST: usize = 256;
+
+/// Adds at most [`MOST`] numbers.
+fn add(hash: &mut Sha256, values: &[f32]) {
+    let mut bytes = [[0; 4]; MOST];
+    for (bytes, value) in bytes.iter_mut().zip(values) {
+        *bytes = value.to_le_bytes();
+    }
+    hash.update(bytes[..values.len()].as_flattened());
+}
+
+/// SHA-256 of what an output would hold.
+fn digest(published: &RwLock<Published>) -> [u8; 32] {
+    let shared = lock_read(published);
+    let field = &shared.last.field;
+    let mut hash = Sha256::new();
+    match &shared.region {
+        Some(region) => {
+            let rows = field.as_chunks::<3>().0;
+            for &node in region {
+                add(&mut hash, &rows[node as usize]);
+            }
+        }
+        None => field.chunks(MOST).for_each(|part| add(&mut hash, part)),
+    }
+    hash.finalize().into()
+}
+
+/// The line of a step.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub(super) fn step(recorder: &mut Recorder, input: &StepInput<'_>) -> Result<()> {
+    let mut line = Step {
+        displacement: input.displacement.map(Rows::of).transpose()?,
+        loads: loading(&input.loads)?,
+        time_s: input.time_s,
+        ..Step::default()
+    };
+    match input.contact {
+        Contact::None => {}
+        Contact::Dense(field) => line.collision = Some(Rows::of(field)?),
+        Contact::Sparse { nodes, vectors } => {
+            line.contact = Some(Rows {
+                nodes: Cow::Borrowed(nodes),
+                vectors: Cow::Borrowed(vectors),
+            });
+        }
+        Contact::Tools(tools) => {
+            let mut instruments = memory::room(tools.len(), WHAT)?;
+            for tool in tools {
+                instruments.push(recorder.instrument(tool)?);
+            }
+            line.instruments = Some(instruments);
+        }
+    }
+    recorder.open_step(line)
+}
+
+fn loading<'a>(loads: &Loads<'a>) -> Result<Loading<'a>> {
+    let pose = |pose: SupportPose| Pose {
+        position: pose.position,
+        rotation: pose.rotation,
+    };
+    let pressures = loads.pressures.iter().map(|own| Pressure {
+        nodes: Cow::Borrowed(own.nodes),
+        pascal: own.pascal,
+    });
+    let supports = loads.supports.iter().map(|own| Support {
+        group: own.group,
+        let_go: own.let_go,
+        pose: own.pose.map(pose),
+        displacements: own.displacements.map(Cow::Borrowed),
+    });
+    Ok(Loading {
+        gravity: loads.gravity,
+        gravity_at_rest: loads.gravity_at_rest,
+        forces: loads.forces.map(Rows::of).transpose()?,
+        pressures: memory::collected(loads.pressures.len(), pressures, WHAT)?,
+        support: loads.support.map(pose),
+        supports: memory::collected(loads.supports.len(), supports, WHAT)?,
+        ties: memory::collected(loads.ties.len(), loads.ties.iter().map(Tie::from), WHAT)?,
+    })
+}
