@@ -130,6 +130,8 @@ check unity_complete unity_complete
 
 # shellcheck source=tests/package/crates.sh
 source "$root/tests/package/crates.sh"
+# shellcheck source=tests/package/recipes.sh
+source "$root/tests/package/recipes.sh"
 
-echo "$passed passed, $failed failed, 0 skipped"
+echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" -eq 0 ]

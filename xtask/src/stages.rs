@@ -59,7 +59,7 @@ pub const STAGES: &[&[&[Stage]]] = &[
             stage("c", "C and C++ hosts, CMake package, simulator", system::NATIVE, Script("tests/c/run.sh")),
             stage("csharp", "the Unity package's C# under Mono", system::CSHARP, Script("tests/csharp/run.sh")),
             stage("godot", "the GDExtension in a real engine", system::NATIVE, Script("examples/godot/run.sh")),
-            stage("package", "the archive, unpacked elsewhere", system::NATIVE, Function(package)),
+            stage("package", "the archive, unpacked elsewhere", system::PACKAGE, Function(package)),
             stage("view", "upt view in headless Chromium", system::BROWSER, Script("tests/view/run.sh")),
         ],
         &[
@@ -145,8 +145,9 @@ fn in_python(workspace: &Workspace, words: &str) -> Result<Outcome> {
     counted(workspace, words, &mut command, counts::summary)
 }
 
-/// It reads the pages of the archive.
+/// It reads the pages of the archive, and follows the recipes of other package managers.
 fn package(workspace: &Workspace) -> Result<Outcome> {
     venv::install(workspace, venv::DOCS)?;
+    venv::install(workspace, venv::RECIPES)?;
     script(workspace, "package", "tests/package/run.sh", &[])
 }

@@ -35,6 +35,14 @@ pub const NATIVE: Needs = "
     libgl1-mesa-dri  /usr/lib/x86_64-linux-gnu/dri/swrast_dri.so /usr/lib/aarch64-linux-gnu/dri/swrast_dri.so \
                      /usr/lib/x86_64-linux-gnu/libgallium.so /usr/lib/x86_64-linux-gnu/dri/libdril_dri.so";
 
+/// What the tests of packages need.
+pub const PACKAGE: Needs = "
+    cmake       cmake
+    g++         c++ g++ clang++
+    pkg-config  pkg-config
+    dpkg-dev    dpkg-source
+    lintian     lintian";
+
 /// What the C# tests need.
 pub const CSHARP: Needs = "
     mono-mcs                     mcs

@@ -30,6 +30,9 @@ pub const SBOM: Set = (
     None,
 );
 
+/// What makes a package of the recipe for Conan.
+pub const RECIPES: Set = ("recipes", "conan==2.34.0", None);
+
 /// What builds an sdist, and a wheel from it without an environment of its own.
 pub const SDIST: Set = ("sdist", "setuptools>=77 wheel", None);
 
