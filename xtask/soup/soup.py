@@ -34,6 +34,16 @@ def evidence(commit: str, changed: bool) -> dict | None:
     return found if found and not changed and not found["changed"] and found["commit"] == commit else None
 
 
+def whole(run: dict | None) -> dict | None:
+    """A run, with the stages that it lacks and the hash of each log that it left in `target/xtask-logs`."""
+    if not run:
+        return None
+    missing = [name for name in run["of"] if name not in run["stages"]]
+    failed = [name for name, one in run["stages"].items() if one["failed"]]
+    logs = {file.name: digest(file) for file in sorted(LOGS.glob("*.log"))}
+    return {**run, "is_whole": not missing, "not_run": missing, "failed_stages": failed, "logs_sha256": logs}
+
+
 def rust_results(log: str) -> dict[str, str]:
     """`file of the test program::function` -> ok, FAILED or ignored, out of what `cargo test` printed."""
     results, program = {}, ""
@@ -135,7 +145,7 @@ def gather() -> tuple[dict, list[str]]:
         "requirements": [row(one, run, rust) for one in found.values()],
         "ways_to_fail": failures(),
         "known_anomalies": json.loads((ROOT / "docs/reference/anomalies.json").read_bytes())["anomalies"],
-        "test_run": run,
+        "test_run": whole(run),
         "bundles": [bundle(folder) for folder in folders],
     }, faults
 
@@ -186,6 +196,8 @@ def page(soup: dict) -> str:
         lines += [
             f"| {key} | {one['passed']} | {one['failed']} | {one['skipped']} |" for key, one in run["stages"].items()
         ]
+        lines += [f"| {key} | **not run** | | |" for key in run["not_run"]]
+        lines += ["", f"SHA-256 of the {len(run['logs_sha256'])} logs: `soup.json`."]
     else:
         lines.append("None of this commit: run `cargo xtask test` in a clean clone first.")
     lines += [
@@ -216,6 +228,9 @@ def main() -> int:
     results = [test["result"] for one in soup["requirements"] for test in one["verified_by"]]
     count = {one: results.count(one) for one in sorted(set(results))}
     print(f"{folder}/soup.json, soup.md: {len(soup['requirements'])} requirements, tests of them: {count}")
+    run = soup["test_run"]
+    if run and not run["is_whole"]:
+        print(f"the test run is not whole: {', '.join(run['not_run'])} did not run at this commit")
     print("\n".join(faults), end="\n" if faults else "")
     return int(bool(faults) or "FAILED" in results)
 

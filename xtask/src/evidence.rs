@@ -4,6 +4,7 @@ use anyhow::Result;
 use serde_json::{Map, Value, json};
 
 use crate::process::output;
+use crate::stages::STAGES;
 use crate::workspace::Workspace;
 
 const FILE: &str = "target/xtask-logs/evidence.json";
@@ -60,6 +61,8 @@ pub fn write(workspace: &Workspace, tree: &Tree, stages: Map<String, Value>) -> 
             "cores": std::thread::available_parallelism().map_or(0, usize::from),
         },
         "stages": all,
+        // Those that a whole run has: `soup` says which were left out.
+        "of": STAGES.iter().copied().flatten().copied().flatten().map(|stage| stage.name).collect::<Vec<_>>(),
     });
     std::fs::create_dir_all(path.with_file_name(""))?;
     std::fs::write(path, serde_json::to_string_pretty(&evidence)? + "\n")?;
