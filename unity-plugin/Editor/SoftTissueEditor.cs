@@ -45,7 +45,7 @@ namespace Upt.Editor
                                                                     reading.penetration.ToString("0.00") + " mm");
             }
             for (int i = 0; i < FlagNames.Length; i++)
-                if ((stats.flags & (1u << i)) != 0) EditorGUILayout.HelpBox(FlagNames[i], MessageType.Warning);
+                if ((stats.flags & (upt_flag)(1u << i)) != 0) EditorGUILayout.HelpBox(FlagNames[i], MessageType.Warning);
             Repaint();
         }
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use anyhow::{Result, bail};
 
-use crate::source::{Function, Kind, Named, Source, Struct};
+use crate::source::{Enumeration, Function, Kind, Named, Source, Struct};
 
 const HEAD: &str = "\
 // Written by `cargo xtask header` from src/ffi/; conventions: docs/reference/abi.md.
@@ -19,6 +19,10 @@ namespace Upt.Interop
 /// The whole file.
 pub fn write(source: &Source) -> Result<String> {
     let mut out = String::from(HEAD);
+    for item in &source.enumerations {
+        enumeration(&mut out, source, item)?;
+        out.push('\n');
+    }
     for item in &source.structs {
         structure(&mut out, source, item)?;
         out.push('\n');
@@ -28,9 +32,14 @@ pub fn write(source: &Source) -> Result<String> {
     out.push_str("        const string Library = \"upt\";\n\n");
     for constant in &source.constants {
         summary(&mut out, 8, &constant.doc);
-        let ty = if constant.unsigned { "uint" } else { "int" };
         let (name, value) = (&constant.name, &constant.value);
-        writeln!(out, "        public const {ty} {name} = {value};")?;
+        match &constant.of {
+            Some(of) => writeln!(out, "        public const {of} {name} = {of}.{name};")?,
+            None => {
+                let ty = if constant.unsigned { "uint" } else { "int" };
+                writeln!(out, "        public const {ty} {name} = {value};")?;
+            }
+        }
     }
     for item in &source.functions {
         out.push('\n');
@@ -40,12 +49,33 @@ pub fn write(source: &Source) -> Result<String> {
     Ok(out)
 }
 
+/// Its values have the names of C; `Native` has them, too.
+fn enumeration(out: &mut String, source: &Source, item: &Enumeration) -> Result<()> {
+    let Enumeration { doc, name, number } = item;
+    summary(out, 4, doc);
+    // A set of bits.
+    if name == "upt_flag" {
+        out.push_str("    [Flags]\n");
+    }
+    let number = ty(source, &Kind::Number(number.clone()))?;
+    writeln!(out, "    public enum {name} : {number}\n    {{")?;
+    for constant in source.values(name) {
+        summary(out, 8, &constant.doc);
+        writeln!(out, "        {} = {},", constant.name, constant.value)?;
+    }
+    out.push_str("    }\n");
+    Ok(())
+}
+
 fn structure(out: &mut String, source: &Source, item: &Struct) -> Result<()> {
     summary(out, 4, &item.doc);
     out.push_str("    [StructLayout(LayoutKind.Sequential)]\n");
     writeln!(out, "    public unsafe struct {}\n    {{", item.name)?;
     for Named {
-        doc, name, kind, ..
+        doc,
+        name,
+        kind,
+        of,
     } in &item.fields
     {
         summary(out, 8, doc);
@@ -54,7 +84,7 @@ fn structure(out: &mut String, source: &Source, item: &Struct) -> Result<()> {
                 let element = ty(source, element)?;
                 writeln!(out, "        public fixed {element} {name}[{length}];")?;
             }
-            _ => writeln!(out, "        public {} {name};", ty(source, kind)?)?,
+            _ => writeln!(out, "        public {} {name};", typed(source, kind, of)?)?,
         }
     }
     out.push_str("    }\n");
@@ -65,7 +95,7 @@ fn function(out: &mut String, source: &Source, item: &Function) -> Result<()> {
     summary(out, 8, &item.doc);
     out.push_str("        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]\n");
     let result = match &item.result {
-        Some(kind) => ty(source, kind)?,
+        Some(kind) => typed(source, kind, &item.result_of)?,
         None => "void".into(),
     };
     let parameters = item
@@ -74,7 +104,7 @@ fn function(out: &mut String, source: &Source, item: &Function) -> Result<()> {
         .map(|parameter| {
             Ok(format!(
                 "{} {}",
-                ty(source, &parameter.kind)?,
+                typed(source, &parameter.kind, &parameter.of)?,
                 escape(&parameter.name)
             ))
         })
@@ -85,6 +115,15 @@ fn function(out: &mut String, source: &Source, item: &Function) -> Result<()> {
         "        public static extern {result} {name}({parameters});"
     )?;
     Ok(())
+}
+
+/// A type whose numbers may be of an enumeration, also behind a pointer.
+fn typed(source: &Source, kind: &Kind, of: &Option<String>) -> Result<String> {
+    Ok(match (kind, of) {
+        (Kind::Number(_), Some(of)) => of.clone(),
+        (Kind::Pointer(target, _), Some(_)) => format!("{}*", typed(source, target, of)?),
+        _ => ty(source, kind)?,
+    })
 }
 
 fn ty(source: &Source, kind: &Kind) -> Result<String> {

@@ -90,6 +90,8 @@ pub struct Function {
     pub name: String,
     pub parameters: Vec<Named>,
     pub result: Option<Kind>,
+    /// The enumeration that its result is one of.
+    pub result_of: Option<String>,
 }
 
 /// The whole ABI.
@@ -186,6 +188,10 @@ impl Source {
                     result: match &item.sig.output {
                         ReturnType::Default => None,
                         ReturnType::Type(_, result) => Some(self.kind(result)?),
+                    },
+                    result_of: match &item.sig.output {
+                        ReturnType::Default => None,
+                        ReturnType::Type(_, result) => self.enumeration(result),
                     },
                 });
             }

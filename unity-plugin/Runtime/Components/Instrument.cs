@@ -52,7 +52,7 @@ namespace Upt
             shownScale = unitsPerMillimetre;
             upt_instrument instrument = default(upt_instrument);
             instrument.struct_size = (uint)sizeof(upt_instrument);
-            instrument.shape = (int)shape;
+            instrument.shape = (upt_shape)shape;
             Anatomical.FromUnity(tissue.InverseTransformPoint(transform.position), unitsPerMillimetre,
                                  instrument.position);
             Anatomical.FromUnity(Quaternion.Inverse(tissue.rotation) * transform.rotation, instrument.rotation);
@@ -64,7 +64,7 @@ namespace Upt
             instrument.radius = radius;
             instrument.sticking = (byte)(sticking ? 1 : 0);
             instrument.friction = friction;
-            instrument.mode = (byte)(grasp ? Native.UPT_MODE_GRASP : Native.UPT_MODE_SLIDE);
+            instrument.mode = grasp ? Native.UPT_MODE_GRASP : Native.UPT_MODE_SLIDE;
             instrument.tear_off_mn = tearOff;
             if (shape == InstrumentShape.Hull) instrument.hull = HullAt(unitsPerMillimetre);
             return instrument;

@@ -21,10 +21,10 @@ namespace Upt.Interop
     public static unsafe class Log
     {
         [UnmanagedFunctionPointer(CallingConvention.Cdecl)]
-        private delegate void NativeLog(int level, byte* message, IntPtr user);
+        private delegate void NativeLog(upt_log_level level, byte* message, IntPtr user);
 
         private static readonly NativeLog Callback = OnMessage;
-        private static volatile Action<int, string> receiver;
+        private static volatile Action<upt_log_level, string> receiver;
 
         static Log()
         {
@@ -39,7 +39,7 @@ namespace Upt.Interop
         /// <paramref name="target"/>. A null target turns the log off, and so do the unloading of the scripting domain and
         /// the end of the process.
         /// </summary>
-        public static void Set(Action<int, string> target, int level)
+        public static void Set(Action<upt_log_level, string> target, upt_log_level level)
         {
             Library.Verify();
             if (target == null)
@@ -60,9 +60,9 @@ namespace Upt.Interop
         }
 
         [MonoPInvokeCallback(typeof(NativeLog))]
-        private static void OnMessage(int level, byte* message, IntPtr user)
+        private static void OnMessage(upt_log_level level, byte* message, IntPtr user)
         {
-            Action<int, string> target = receiver;
+            Action<upt_log_level, string> target = receiver;
             if (target == null) return;
             try
             {

@@ -34,7 +34,7 @@ namespace Upt.Interop
             handle = new ModelHandle(pointer);
             upt_model_info info = default(upt_model_info);
             info.struct_size = (uint)sizeof(upt_model_info);
-            int status = Native.upt_model_read_info(pointer, &info);
+            upt_status status = Native.upt_model_read_info(pointer, &info);
             if (status < 0) handle.Dispose();
             Status.Check(status);
             Info = info;
@@ -74,7 +74,7 @@ namespace Upt.Interop
 
         /// <summary>An index set (<c>Native.UPT_SET_*</c>) of the mesh: nodes, or 3 per face, or 4 per
         /// tetrahedron.</summary>
-        public uint[] Indices(int set)
+        public uint[] Indices(upt_index_set set)
         {
             bool added = false;
             handle.DangerousAddRef(ref added);

@@ -5,6 +5,276 @@ using System.Runtime.InteropServices;
 
 namespace Upt.Interop
 {
+    /// <summary>What a call returns: 0 is success, positive values are not errors, negative values are errors.</summary>
+    public enum upt_status : int
+    {
+        /// <summary>Success.</summary>
+        UPT_OK = 0,
+        /// <summary>The submitted step has not finished.</summary>
+        UPT_PENDING = 1,
+        /// <summary>A required pointer is NULL.</summary>
+        UPT_ERR_NULL = -1,
+        /// <summary>A size, index, enum or range is wrong.</summary>
+        UPT_ERR_ARGUMENT = -2,
+        /// <summary>This library does not know this `struct_size`.</summary>
+        UPT_ERR_STRUCT_SIZE = -3,
+        /// <summary>Not a live handle of this type.</summary>
+        UPT_ERR_HANDLE = -4,
+        /// <summary>The scene is in use by another thread or has a step in flight.</summary>
+        UPT_ERR_BUSY = -5,
+        /// <summary>An input holds NaN or Inf.</summary>
+        UPT_ERR_NON_FINITE = -6,
+        /// <summary>The call does not fit the state (for instance: wait without submit).</summary>
+        UPT_ERR_STATE = -7,
+        /// <summary>This build or this bundle cannot do it.</summary>
+        UPT_ERR_UNSUPPORTED = -8,
+        /// <summary>There is not enough memory for the call.</summary>
+        UPT_ERR_OUT_OF_MEMORY = -9,
+        /// <summary>ONNX Runtime is missing, too old or broken; the message lists what was tried.</summary>
+        UPT_ERR_RUNTIME = -20,
+        /// <summary>No provider of the list can run the model.</summary>
+        UPT_ERR_PROVIDER = -21,
+        /// <summary>A file cannot be read.</summary>
+        UPT_ERR_IO = -30,
+        /// <summary>A bundle is invalid; the message names the file and the field.</summary>
+        UPT_ERR_BUNDLE = -31,
+        /// <summary>The version of a bundle or snapshot is not supported.</summary>
+        UPT_ERR_VERSION = -32,
+        /// <summary>A snapshot is damaged or belongs to another model.</summary>
+        UPT_ERR_SNAPSHOT = -33,
+        /// <summary>The guard refused the new state; the last good state stays.</summary>
+        UPT_ERR_GUARD = -40,
+        /// <summary>A bug in the library; the scene can only be destroyed.</summary>
+        UPT_ERR_PANIC = -90,
+    }
+
+    /// <summary>What runs the networks of a model.</summary>
+    public enum upt_provider : int
+    {
+        /// <summary>ONNX Runtime's CPU provider and the native kernels.</summary>
+        UPT_PROVIDER_CPU = 0,
+        /// <summary>NVIDIA CUDA.</summary>
+        UPT_PROVIDER_CUDA = 1,
+        /// <summary>NVIDIA TensorRT.</summary>
+        UPT_PROVIDER_TENSORRT = 2,
+        /// <summary>NVIDIA TensorRT-RTX (a plugin provider).</summary>
+        UPT_PROVIDER_TENSORRT_RTX = 3,
+    }
+
+    /// <summary>What a model is.</summary>
+    public enum upt_kind : int
+    {
+        /// <summary>A Universal Physics Transformer.</summary>
+        UPT_KIND_UPT = 0,
+        /// <summary>A linear-elastic response with a learned correction in a static basis.</summary>
+        UPT_KIND_REDUCED = 1,
+    }
+
+    /// <summary>How much the log tells.</summary>
+    public enum upt_log_level : int
+    {
+        /// <summary>No messages.</summary>
+        UPT_LOG_OFF = 0,
+        /// <summary>Failures.</summary>
+        UPT_LOG_ERROR = 1,
+        /// <summary>Fallbacks, and each flag once when it rises: contacts outside the envelope, states that the guard refuses.</summary>
+        UPT_LOG_WARN = 2,
+        /// <summary>Loading: what was opened and which provider runs it.</summary>
+        UPT_LOG_INFO = 3,
+        /// <summary>Stage times.</summary>
+        UPT_LOG_DEBUG = 4,
+        /// <summary>Everything.</summary>
+        UPT_LOG_TRACE = 5,
+    }
+
+    /// <summary>Arithmetic of the heavy stages.</summary>
+    public enum upt_precision : int
+    {
+        /// <summary>32-bit floats: the reference. In a scene's options: the model's precision.</summary>
+        UPT_PRECISION_F32 = 0,
+        /// <summary>bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which.</summary>
+        UPT_PRECISION_BF16 = 1,
+        /// <summary>16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own.</summary>
+        UPT_PRECISION_F16 = 2,
+        /// <summary>8-bit integers: the bundle's `*.int8.onnx`.</summary>
+        UPT_PRECISION_INT8 = 3,
+        /// <summary>In options only: 32-bit floats, even in a scene of a model that was opened with another precision.</summary>
+        UPT_PRECISION_FORCE_F32 = 4,
+    }
+
+    /// <summary>What decodes.</summary>
+    public enum upt_kernel : int
+    {
+        /// <summary>The library chooses the decoder.</summary>
+        UPT_KERNEL_AUTO = 0,
+        /// <summary>The fused native decoder.</summary>
+        UPT_KERNEL_NATIVE = 1,
+        /// <summary>ONNX Runtime sessions in node tiles.</summary>
+        UPT_KERNEL_ONNX = 2,
+        /// <summary>ONNX Runtime, all nodes in one run with the query table resident on the device.</summary>
+        UPT_KERNEL_RESIDENT = 3,
+    }
+
+    /// <summary>Who makes a step of a `UPT_KIND_UPT` bundle.</summary>
+    public enum upt_step_path : int
+    {
+        /// <summary>On the CPU: split. On a device: the faster of split and whole, timed while the scene is created.</summary>
+        UPT_STEP_AUTO = 0,
+        /// <summary>Native encoder and message mean, then `latent.onnx` and the decoder.</summary>
+        UPT_STEP_SPLIT = 1,
+        /// <summary>The bundle's `step.onnx`, which decodes every node in every step.</summary>
+        UPT_STEP_WHOLE = 2,
+        /// <summary>The faster of split and whole, timed while the scene is created.</summary>
+        UPT_STEP_MEASURED = 3,
+    }
+
+    /// <summary>How many corrections a step gets.</summary>
+    public enum upt_corrections_mode : int
+    {
+        /// <summary>As many as the bundle recommends, until its own target is reached.</summary>
+        UPT_CORRECTIONS_RECOMMENDED = 0,
+        /// <summary>None.</summary>
+        UPT_CORRECTIONS_NONE = 1,
+        /// <summary>`count` of them; with a target or a budget at most so many.</summary>
+        UPT_CORRECTIONS_COUNT = 2,
+        /// <summary>As many as the target needs and the budget allows, up to 64.</summary>
+        UPT_CORRECTIONS_AUTO = 3,
+    }
+
+    /// <summary>A switch, for what is usually on.</summary>
+    public enum upt_switch : byte
+    {
+        /// <summary>A switch: as usual, which its field says.</summary>
+        UPT_SWITCH_DEFAULT = 0,
+        /// <summary>A switch: on.</summary>
+        UPT_SWITCH_ON = 1,
+        /// <summary>A switch: off.</summary>
+        UPT_SWITCH_OFF = 2,
+    }
+
+    /// <summary>What happens to a state that the guard refuses.</summary>
+    public enum upt_guard_policy : int
+    {
+        /// <summary>
+        /// Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
+        /// under `UPT_GUARD_BLEND`.
+        /// </summary>
+        UPT_GUARD_HOLD = 0,
+        /// <summary>Publish finite states and set flags.</summary>
+        UPT_GUARD_REPORT = 1,
+        /// <summary>Replace a refused state by the prior's or by rest, and set flags.</summary>
+        UPT_GUARD_BLEND = 2,
+    }
+
+    /// <summary>Bits of `flags`.</summary>
+    [Flags]
+    public enum upt_flag : uint
+    {
+        /// <summary>A push is longer than the model was trained on.</summary>
+        UPT_FLAG_PUSH = 1,
+        /// <summary>A contact area is outside the trained range.</summary>
+        UPT_FLAG_CONTACT_AREA = 2,
+        /// <summary>A contact lies outside the domain.</summary>
+        UPT_FLAG_SITE = 4,
+        /// <summary>A push changes faster than trained.</summary>
+        UPT_FLAG_RATE = 8,
+        /// <summary>More separate contact sites than trained.</summary>
+        UPT_FLAG_SITES = 16,
+        /// <summary>Guard: a displacement passes the bound.</summary>
+        UPT_FLAG_BOUND = 32,
+        /// <summary>Guard: the state is not finite.</summary>
+        UPT_FLAG_NON_FINITE = 64,
+        /// <summary>An element at the contact is inverted; with `check_inversion` any element, and the guard refuses the state.</summary>
+        UPT_FLAG_INVERTED = 128,
+        /// <summary>Guard: the displacement grew too much in one step.</summary>
+        UPT_FLAG_GROWTH = 256,
+        /// <summary>The learned correction was bounded.</summary>
+        UPT_FLAG_CLAMPED = 512,
+        /// <summary>The contact block was nearly singular and was regularised.</summary>
+        UPT_FLAG_REGULARISED = 1024,
+        /// <summary>
+        /// The corrections ended with inverted elements, or had lost the contact of an instrument: the step's first guess or the linear response
+        /// took their place.
+        /// </summary>
+        UPT_FLAG_FELL_BACK = 2048,
+        /// <summary>The estimated error is above the scene's `error_limit_mm`.</summary>
+        UPT_FLAG_ERROR = 4096,
+        /// <summary>Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.</summary>
+        UPT_FLAG_DEEP = 8192,
+        /// <summary>The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings).</summary>
+        UPT_FLAG_UNSOLVED = 16384,
+        /// <summary>The bundle's tissue relaxes, and this scene makes no corrections, which alone know of it: what it shows and feels is elastic.</summary>
+        UPT_FLAG_ELASTIC = 32768,
+    }
+
+    /// <summary>A static set of indices of a mesh.</summary>
+    public enum upt_index_set : int
+    {
+        /// <summary>Nodes of the surface.</summary>
+        UPT_SET_SURFACE_NODES = 0,
+        /// <summary>Nodes that instruments may touch.</summary>
+        UPT_SET_DOMAIN_NODES = 1,
+        /// <summary>Nodes held at zero under the bundle's boundary condition.</summary>
+        UPT_SET_FIXED_NODES = 2,
+        /// <summary>Surface triangles, 3 node indices each, outward.</summary>
+        UPT_SET_SURFACE_FACES = 3,
+        /// <summary>Triangles that instruments may touch, 3 node indices each, outward.</summary>
+        UPT_SET_DOMAIN_FACES = 4,
+        /// <summary>Tetrahedra, 4 node indices each, positive volume.</summary>
+        UPT_SET_TETS = 5,
+    }
+
+    /// <summary>What is shown of a state.</summary>
+    public enum upt_view_kind : int
+    {
+        /// <summary>The region's nodes in its order; all nodes where there is no region.</summary>
+        UPT_VIEW_REGION = 0,
+        /// <summary>The attached points.</summary>
+        UPT_VIEW_POINTS = 1,
+        /// <summary>The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.</summary>
+        UPT_VIEW_SURFACE = 2,
+    }
+
+    /// <summary>Shape of an instrument.</summary>
+    public enum upt_shape : int
+    {
+        /// <summary>An instrument's shape: a capsule along local y.</summary>
+        UPT_SHAPE_CAPSULE = 0,
+        /// <summary>An instrument's shape: a box.</summary>
+        UPT_SHAPE_BOX = 1,
+        /// <summary>An instrument's shape: a box with rounded corners.</summary>
+        UPT_SHAPE_SPATULA = 2,
+        /// <summary>An instrument's shape: a hull from `upt_hull_create`.</summary>
+        UPT_SHAPE_HULL = 3,
+        /// <summary>An instrument's shape: a ball of `radius`.</summary>
+        UPT_SHAPE_SPHERE = 4,
+    }
+
+    /// <summary>What an instrument does to the tissue.</summary>
+    public enum upt_mode : byte
+    {
+        /// <summary>An instrument pushes, with Coulomb friction.</summary>
+        UPT_MODE_SLIDE = 0,
+        /// <summary>
+        /// An instrument grasps what lies within 0.5 mm of it when the mode changes to this, and holds it until the mode changes back
+        /// or the grasp tears off.
+        /// </summary>
+        UPT_MODE_GRASP = 1,
+    }
+
+    /// <summary>What a tie is tied to.</summary>
+    public enum upt_end : int
+    {
+        /// <summary>A tie's far end is in the mesh's frame, which goes with the support.</summary>
+        UPT_END_SUPPORT = 0,
+        /// <summary>A tie's far end is in the world, which is the mesh's frame where no support moves.</summary>
+        UPT_END_WORLD = 1,
+        /// <summary>A tie's far end is on an instrument.</summary>
+        UPT_END_INSTRUMENT = 2,
+        /// <summary>A tie's far end is another point of the tissue: a suture.</summary>
+        UPT_END_TISSUE = 3,
+    }
+
     /// <summary>Options of `upt_init`.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public unsafe struct upt_init_options
@@ -26,13 +296,13 @@ namespace Upt.Interop
         /// <summary>Threads that a step may use, the caller's included; 0: the default of `upt_init`.</summary>
         public uint threads;
         /// <summary>`UPT_PROVIDER_*` in order of preference; NULL: CPU.</summary>
-        public int* providers;
+        public upt_provider* providers;
         /// <summary>Entries in `providers`.</summary>
         public ulong provider_count;
         /// <summary>Device of GPU providers, from 0.</summary>
         public int device_id;
         /// <summary>`UPT_PRECISION_*`.</summary>
-        public int precision;
+        public upt_precision precision;
         /// <summary>Bytes; 0: no limit. Needs a GPU provider in `providers`.</summary>
         public ulong gpu_memory_limit;
         /// <summary>Folder for compiled engines; NULL: they are not kept.</summary>
@@ -42,7 +312,7 @@ namespace Upt.Interop
         /// <summary>1: capture CUDA graphs.</summary>
         public byte cuda_graph;
         /// <summary>`UPT_SWITCH_*`: the next provider is tried where one cannot run the model, usually on; off: `UPT_ERR_PROVIDER`.</summary>
-        public byte fallback;
+        public upt_switch fallback;
         /// <summary>1: the same bits on every processor, for replays and lockstep; steps take longer. Reduced bundles without a network.</summary>
         public byte portable;
         /// <summary>A `cudaStream_t` of `device_id` that runs the graphs and must outlive the model and its scenes; NULL: ONNX Runtime makes its own.</summary>
@@ -56,7 +326,7 @@ namespace Upt.Interop
         /// <summary>`sizeof(upt_model_info)`, set by the caller.</summary>
         public uint struct_size;
         /// <summary>`UPT_KIND_*`.</summary>
-        public int kind;
+        public upt_kind kind;
         /// <summary>K, the nodes of the bundle's mesh.</summary>
         public ulong node_count;
         /// <summary>Tetrahedra.</summary>
@@ -74,9 +344,9 @@ namespace Upt.Interop
         /// <summary>Longest push that the model was trained on, mm.</summary>
         public float max_push_mm;
         /// <summary>`UPT_PROVIDER_*` that runs the latent stage.</summary>
-        public int provider;
+        public upt_provider provider;
         /// <summary>`UPT_PRECISION_*`.</summary>
-        public int precision;
+        public upt_precision precision;
         /// <summary>Host memory of the model.</summary>
         public ulong memory_bytes;
         /// <summary>Wall time of `upt_model_create`.</summary>
@@ -93,7 +363,7 @@ namespace Upt.Interop
     public unsafe struct upt_corrections
     {
         /// <summary>`UPT_CORRECTIONS_*`.</summary>
-        public int mode;
+        public upt_corrections_mode mode;
         /// <summary>With `UPT_CORRECTIONS_COUNT` 1 to 64; otherwise 0.</summary>
         public uint count;
         /// <summary>No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.</summary>
@@ -111,17 +381,17 @@ namespace Upt.Interop
         /// <summary>Threads of a step; 0: the model's.</summary>
         public uint threads;
         /// <summary>`UPT_KERNEL_*`: who decodes.</summary>
-        public int kernel;
+        public upt_kernel kernel;
         /// <summary>`UPT_PRECISION_*` of the native decoder; 0: the model's; `UPT_PRECISION_FORCE_F32`: float32, whatever the model's is.</summary>
-        public int precision;
+        public upt_precision precision;
         /// <summary>`UPT_GUARD_*`.</summary>
-        public int guard_policy;
+        public upt_guard_policy guard_policy;
         /// <summary>A mesh of the host's own (`*.mesh.safetensors`); NULL: the bundle's.</summary>
         public byte* mesh_path;
         /// <summary>`UPT_SWITCH_*`: held nodes and nodes in contact are where they belong, usually on; off: where the networks put them.</summary>
-        public byte boundary;
+        public upt_switch boundary;
         /// <summary>`UPT_SWITCH_*`: tissue at rest sleeps, usually on.</summary>
-        public byte sleep;
+        public upt_switch sleep;
         /// <summary>1: the guard looks for inverted elements in each step.</summary>
         public byte check_inversion;
         /// <summary>1: a submit while a step is in flight replaces the waiting contact and does not return `UPT_ERR_BUSY`.</summary>
@@ -138,7 +408,7 @@ namespace Upt.Interop
         /// <summary>Zero.</summary>
         public fixed byte reserved[1];
         /// <summary>`UPT_STEP_*`: who makes a step of a `UPT_KIND_UPT` bundle.</summary>
-        public int step_path;
+        public upt_step_path step_path;
         /// <summary>Corrections by the elements while there is contact; all zero: as many as the bundle recommends.</summary>
         public upt_corrections corrections;
         /// <summary>`UPT_FLAG_ERROR` rises if the estimated error is above this, mm; 0: never.</summary>
@@ -174,7 +444,7 @@ namespace Upt.Interop
         /// <summary>The most that the passivity controller damps, N s/m; 0: 5.</summary>
         public float damping_limit_n_s_per_m;
         /// <summary>`UPT_SWITCH_*`: passivity observer and controller, usually on.</summary>
-        public byte passivity;
+        public upt_switch passivity;
         /// <summary>Zero.</summary>
         public fixed byte reserved[7];
     }
@@ -240,7 +510,7 @@ namespace Upt.Interop
         /// <summary>`sizeof(upt_scene_stats)`, set by the caller.</summary>
         public uint struct_size;
         /// <summary>`UPT_FLAG_*` of the last step.</summary>
-        public uint flags;
+        public upt_flag flags;
         /// <summary>Steps since creation or reset.</summary>
         public ulong step_count;
         /// <summary>Nodes decoded in the last step.</summary>
@@ -252,11 +522,11 @@ namespace Upt.Interop
         /// <summary>Threads of a step.</summary>
         public uint threads;
         /// <summary>`UPT_KERNEL_*` that decodes.</summary>
-        public int kernel;
+        public upt_kernel kernel;
         /// <summary>`UPT_PROVIDER_*` that runs the latent stage.</summary>
-        public int provider;
+        public upt_provider provider;
         /// <summary>`UPT_PRECISION_*` of the decoder.</summary>
-        public int precision;
+        public upt_precision precision;
         /// <summary>Largest displacement among the decoded nodes, mm.</summary>
         public float max_displacement_mm;
         /// <summary>Largest ratio of push, rate of push, contact area and number of sites to what the model was trained on; above 1: outside.</summary>
@@ -272,7 +542,7 @@ namespace Upt.Interop
         /// <summary>Zero.</summary>
         public fixed byte reserved[4];
         /// <summary>`UPT_STEP_SPLIT` or `UPT_STEP_WHOLE`.</summary>
-        public int step_path;
+        public upt_step_path step_path;
         /// <summary>Corrections made in the last step.</summary>
         public uint corrections;
         /// <summary>Evaluations of the element forces in the last step.</summary>
@@ -416,7 +686,7 @@ namespace Upt.Interop
         /// <summary>`sizeof(upt_tie)`, the same in every element of an array.</summary>
         public uint struct_size;
         /// <summary>What it is tied to: `UPT_END_*`.</summary>
-        public int to;
+        public upt_end to;
         /// <summary>The point of the tissue: nodes, of which one at least is free and near the domain, ...</summary>
         public fixed uint nodes[3];
         /// <summary>... and their weights, 0 or more, with the sum 1; all zero: the first node alone. `upt_scene_tie_points` finds both.</summary>
@@ -501,7 +771,7 @@ namespace Upt.Interop
         /// <summary>`sizeof(upt_view)`.</summary>
         public uint struct_size;
         /// <summary>`UPT_VIEW_*`.</summary>
-        public int kind;
+        public upt_view_kind kind;
     }
 
     /// <summary>A rigid instrument, as `upt_input` and `upt_scene_contacts_from_instruments` take it.</summary>
@@ -511,7 +781,7 @@ namespace Upt.Interop
         /// <summary>`sizeof(upt_instrument)`, the same in every element of an array.</summary>
         public uint struct_size;
         /// <summary>`UPT_SHAPE_*`.</summary>
-        public int shape;
+        public upt_shape shape;
         /// <summary>Centre, mm, in the mesh's frame.</summary>
         public fixed float position[3];
         /// <summary>Unit quaternion x, y, z, w; all zero is no rotation.</summary>
@@ -523,7 +793,7 @@ namespace Upt.Interop
         /// <summary>Only for `upt_scene_contacts_from_instruments`. 1: touched nodes move with the instrument until it leaves; 0: they slide.</summary>
         public byte sticking;
         /// <summary>Only for `upt_input`: `UPT_MODE_*`.</summary>
-        public byte mode;
+        public upt_mode mode;
         /// <summary>Zero.</summary>
         public fixed byte reserved[2];
         /// <summary>Only for `upt_input`: Coulomb's coefficient, 0 or more.</summary>
@@ -657,194 +927,194 @@ namespace Upt.Interop
         const string Library = "upt";
 
         /// <summary>Success.</summary>
-        public const int UPT_OK = 0;
+        public const upt_status UPT_OK = upt_status.UPT_OK;
         /// <summary>The submitted step has not finished.</summary>
-        public const int UPT_PENDING = 1;
+        public const upt_status UPT_PENDING = upt_status.UPT_PENDING;
         /// <summary>A required pointer is NULL.</summary>
-        public const int UPT_ERR_NULL = -1;
+        public const upt_status UPT_ERR_NULL = upt_status.UPT_ERR_NULL;
         /// <summary>A size, index, enum or range is wrong.</summary>
-        public const int UPT_ERR_ARGUMENT = -2;
+        public const upt_status UPT_ERR_ARGUMENT = upt_status.UPT_ERR_ARGUMENT;
         /// <summary>This library does not know this `struct_size`.</summary>
-        public const int UPT_ERR_STRUCT_SIZE = -3;
+        public const upt_status UPT_ERR_STRUCT_SIZE = upt_status.UPT_ERR_STRUCT_SIZE;
         /// <summary>Not a live handle of this type.</summary>
-        public const int UPT_ERR_HANDLE = -4;
+        public const upt_status UPT_ERR_HANDLE = upt_status.UPT_ERR_HANDLE;
         /// <summary>The scene is in use by another thread or has a step in flight.</summary>
-        public const int UPT_ERR_BUSY = -5;
+        public const upt_status UPT_ERR_BUSY = upt_status.UPT_ERR_BUSY;
         /// <summary>An input holds NaN or Inf.</summary>
-        public const int UPT_ERR_NON_FINITE = -6;
+        public const upt_status UPT_ERR_NON_FINITE = upt_status.UPT_ERR_NON_FINITE;
         /// <summary>The call does not fit the state (for instance: wait without submit).</summary>
-        public const int UPT_ERR_STATE = -7;
+        public const upt_status UPT_ERR_STATE = upt_status.UPT_ERR_STATE;
         /// <summary>This build or this bundle cannot do it.</summary>
-        public const int UPT_ERR_UNSUPPORTED = -8;
+        public const upt_status UPT_ERR_UNSUPPORTED = upt_status.UPT_ERR_UNSUPPORTED;
         /// <summary>There is not enough memory for the call.</summary>
-        public const int UPT_ERR_OUT_OF_MEMORY = -9;
+        public const upt_status UPT_ERR_OUT_OF_MEMORY = upt_status.UPT_ERR_OUT_OF_MEMORY;
         /// <summary>ONNX Runtime is missing, too old or broken; the message lists what was tried.</summary>
-        public const int UPT_ERR_RUNTIME = -20;
+        public const upt_status UPT_ERR_RUNTIME = upt_status.UPT_ERR_RUNTIME;
         /// <summary>No provider of the list can run the model.</summary>
-        public const int UPT_ERR_PROVIDER = -21;
+        public const upt_status UPT_ERR_PROVIDER = upt_status.UPT_ERR_PROVIDER;
         /// <summary>A file cannot be read.</summary>
-        public const int UPT_ERR_IO = -30;
+        public const upt_status UPT_ERR_IO = upt_status.UPT_ERR_IO;
         /// <summary>A bundle is invalid; the message names the file and the field.</summary>
-        public const int UPT_ERR_BUNDLE = -31;
+        public const upt_status UPT_ERR_BUNDLE = upt_status.UPT_ERR_BUNDLE;
         /// <summary>The version of a bundle or snapshot is not supported.</summary>
-        public const int UPT_ERR_VERSION = -32;
+        public const upt_status UPT_ERR_VERSION = upt_status.UPT_ERR_VERSION;
         /// <summary>A snapshot is damaged or belongs to another model.</summary>
-        public const int UPT_ERR_SNAPSHOT = -33;
+        public const upt_status UPT_ERR_SNAPSHOT = upt_status.UPT_ERR_SNAPSHOT;
         /// <summary>The guard refused the new state; the last good state stays.</summary>
-        public const int UPT_ERR_GUARD = -40;
+        public const upt_status UPT_ERR_GUARD = upt_status.UPT_ERR_GUARD;
         /// <summary>A bug in the library; the scene can only be destroyed.</summary>
-        public const int UPT_ERR_PANIC = -90;
+        public const upt_status UPT_ERR_PANIC = upt_status.UPT_ERR_PANIC;
         /// <summary>ONNX Runtime's CPU provider and the native kernels.</summary>
-        public const int UPT_PROVIDER_CPU = 0;
+        public const upt_provider UPT_PROVIDER_CPU = upt_provider.UPT_PROVIDER_CPU;
         /// <summary>NVIDIA CUDA.</summary>
-        public const int UPT_PROVIDER_CUDA = 1;
+        public const upt_provider UPT_PROVIDER_CUDA = upt_provider.UPT_PROVIDER_CUDA;
         /// <summary>NVIDIA TensorRT.</summary>
-        public const int UPT_PROVIDER_TENSORRT = 2;
+        public const upt_provider UPT_PROVIDER_TENSORRT = upt_provider.UPT_PROVIDER_TENSORRT;
         /// <summary>NVIDIA TensorRT-RTX (a plugin provider).</summary>
-        public const int UPT_PROVIDER_TENSORRT_RTX = 3;
+        public const upt_provider UPT_PROVIDER_TENSORRT_RTX = upt_provider.UPT_PROVIDER_TENSORRT_RTX;
         /// <summary>A Universal Physics Transformer.</summary>
-        public const int UPT_KIND_UPT = 0;
+        public const upt_kind UPT_KIND_UPT = upt_kind.UPT_KIND_UPT;
         /// <summary>A linear-elastic response with a learned correction in a static basis.</summary>
-        public const int UPT_KIND_REDUCED = 1;
+        public const upt_kind UPT_KIND_REDUCED = upt_kind.UPT_KIND_REDUCED;
         /// <summary>No messages.</summary>
-        public const int UPT_LOG_OFF = 0;
+        public const upt_log_level UPT_LOG_OFF = upt_log_level.UPT_LOG_OFF;
         /// <summary>Failures.</summary>
-        public const int UPT_LOG_ERROR = 1;
+        public const upt_log_level UPT_LOG_ERROR = upt_log_level.UPT_LOG_ERROR;
         /// <summary>Fallbacks, and each flag once when it rises: contacts outside the envelope, states that the guard refuses.</summary>
-        public const int UPT_LOG_WARN = 2;
+        public const upt_log_level UPT_LOG_WARN = upt_log_level.UPT_LOG_WARN;
         /// <summary>Loading: what was opened and which provider runs it.</summary>
-        public const int UPT_LOG_INFO = 3;
+        public const upt_log_level UPT_LOG_INFO = upt_log_level.UPT_LOG_INFO;
         /// <summary>Stage times.</summary>
-        public const int UPT_LOG_DEBUG = 4;
+        public const upt_log_level UPT_LOG_DEBUG = upt_log_level.UPT_LOG_DEBUG;
         /// <summary>Everything.</summary>
-        public const int UPT_LOG_TRACE = 5;
+        public const upt_log_level UPT_LOG_TRACE = upt_log_level.UPT_LOG_TRACE;
         /// <summary>32-bit floats: the reference. In a scene's options: the model's precision.</summary>
-        public const int UPT_PRECISION_F32 = 0;
+        public const upt_precision UPT_PRECISION_F32 = upt_precision.UPT_PRECISION_F32;
         /// <summary>bfloat16 products where the CPU is faster with them, 32-bit floats elsewhere; the statistics say which.</summary>
-        public const int UPT_PRECISION_BF16 = 1;
+        public const upt_precision UPT_PRECISION_BF16 = upt_precision.UPT_PRECISION_BF16;
         /// <summary>16-bit floats: the bundle's `*.f16.onnx`, or a GPU provider's own.</summary>
-        public const int UPT_PRECISION_F16 = 2;
+        public const upt_precision UPT_PRECISION_F16 = upt_precision.UPT_PRECISION_F16;
         /// <summary>8-bit integers: the bundle's `*.int8.onnx`.</summary>
-        public const int UPT_PRECISION_INT8 = 3;
+        public const upt_precision UPT_PRECISION_INT8 = upt_precision.UPT_PRECISION_INT8;
         /// <summary>In options only: 32-bit floats, even in a scene of a model that was opened with another precision.</summary>
-        public const int UPT_PRECISION_FORCE_F32 = 4;
+        public const upt_precision UPT_PRECISION_FORCE_F32 = upt_precision.UPT_PRECISION_FORCE_F32;
         /// <summary>The library chooses the decoder.</summary>
-        public const int UPT_KERNEL_AUTO = 0;
+        public const upt_kernel UPT_KERNEL_AUTO = upt_kernel.UPT_KERNEL_AUTO;
         /// <summary>The fused native decoder.</summary>
-        public const int UPT_KERNEL_NATIVE = 1;
+        public const upt_kernel UPT_KERNEL_NATIVE = upt_kernel.UPT_KERNEL_NATIVE;
         /// <summary>ONNX Runtime sessions in node tiles.</summary>
-        public const int UPT_KERNEL_ONNX = 2;
+        public const upt_kernel UPT_KERNEL_ONNX = upt_kernel.UPT_KERNEL_ONNX;
         /// <summary>ONNX Runtime, all nodes in one run with the query table resident on the device.</summary>
-        public const int UPT_KERNEL_RESIDENT = 3;
+        public const upt_kernel UPT_KERNEL_RESIDENT = upt_kernel.UPT_KERNEL_RESIDENT;
         /// <summary>On the CPU: split. On a device: the faster of split and whole, timed while the scene is created.</summary>
-        public const int UPT_STEP_AUTO = 0;
+        public const upt_step_path UPT_STEP_AUTO = upt_step_path.UPT_STEP_AUTO;
         /// <summary>Native encoder and message mean, then `latent.onnx` and the decoder.</summary>
-        public const int UPT_STEP_SPLIT = 1;
+        public const upt_step_path UPT_STEP_SPLIT = upt_step_path.UPT_STEP_SPLIT;
         /// <summary>The bundle's `step.onnx`, which decodes every node in every step.</summary>
-        public const int UPT_STEP_WHOLE = 2;
+        public const upt_step_path UPT_STEP_WHOLE = upt_step_path.UPT_STEP_WHOLE;
         /// <summary>The faster of split and whole, timed while the scene is created.</summary>
-        public const int UPT_STEP_MEASURED = 3;
+        public const upt_step_path UPT_STEP_MEASURED = upt_step_path.UPT_STEP_MEASURED;
         /// <summary>As many as the bundle recommends, until its own target is reached.</summary>
-        public const int UPT_CORRECTIONS_RECOMMENDED = 0;
+        public const upt_corrections_mode UPT_CORRECTIONS_RECOMMENDED = upt_corrections_mode.UPT_CORRECTIONS_RECOMMENDED;
         /// <summary>None.</summary>
-        public const int UPT_CORRECTIONS_NONE = 1;
+        public const upt_corrections_mode UPT_CORRECTIONS_NONE = upt_corrections_mode.UPT_CORRECTIONS_NONE;
         /// <summary>`count` of them; with a target or a budget at most so many.</summary>
-        public const int UPT_CORRECTIONS_COUNT = 2;
+        public const upt_corrections_mode UPT_CORRECTIONS_COUNT = upt_corrections_mode.UPT_CORRECTIONS_COUNT;
         /// <summary>As many as the target needs and the budget allows, up to 64.</summary>
-        public const int UPT_CORRECTIONS_AUTO = 3;
+        public const upt_corrections_mode UPT_CORRECTIONS_AUTO = upt_corrections_mode.UPT_CORRECTIONS_AUTO;
         /// <summary>A switch: as usual, which its field says.</summary>
-        public const int UPT_SWITCH_DEFAULT = 0;
+        public const upt_switch UPT_SWITCH_DEFAULT = upt_switch.UPT_SWITCH_DEFAULT;
         /// <summary>A switch: on.</summary>
-        public const int UPT_SWITCH_ON = 1;
+        public const upt_switch UPT_SWITCH_ON = upt_switch.UPT_SWITCH_ON;
         /// <summary>A switch: off.</summary>
-        public const int UPT_SWITCH_OFF = 2;
+        public const upt_switch UPT_SWITCH_OFF = upt_switch.UPT_SWITCH_OFF;
         /// <summary>
         /// Keep the last good state and return `UPT_ERR_GUARD`. A step without contact, which the host cannot change, is treated as
         /// under `UPT_GUARD_BLEND`.
         /// </summary>
-        public const int UPT_GUARD_HOLD = 0;
+        public const upt_guard_policy UPT_GUARD_HOLD = upt_guard_policy.UPT_GUARD_HOLD;
         /// <summary>Publish finite states and set flags.</summary>
-        public const int UPT_GUARD_REPORT = 1;
+        public const upt_guard_policy UPT_GUARD_REPORT = upt_guard_policy.UPT_GUARD_REPORT;
         /// <summary>Replace a refused state by the prior's or by rest, and set flags.</summary>
-        public const int UPT_GUARD_BLEND = 2;
+        public const upt_guard_policy UPT_GUARD_BLEND = upt_guard_policy.UPT_GUARD_BLEND;
         /// <summary>A push is longer than the model was trained on.</summary>
-        public const uint UPT_FLAG_PUSH = 1;
+        public const upt_flag UPT_FLAG_PUSH = upt_flag.UPT_FLAG_PUSH;
         /// <summary>A contact area is outside the trained range.</summary>
-        public const uint UPT_FLAG_CONTACT_AREA = 2;
+        public const upt_flag UPT_FLAG_CONTACT_AREA = upt_flag.UPT_FLAG_CONTACT_AREA;
         /// <summary>A contact lies outside the domain.</summary>
-        public const uint UPT_FLAG_SITE = 4;
+        public const upt_flag UPT_FLAG_SITE = upt_flag.UPT_FLAG_SITE;
         /// <summary>A push changes faster than trained.</summary>
-        public const uint UPT_FLAG_RATE = 8;
+        public const upt_flag UPT_FLAG_RATE = upt_flag.UPT_FLAG_RATE;
         /// <summary>More separate contact sites than trained.</summary>
-        public const uint UPT_FLAG_SITES = 16;
+        public const upt_flag UPT_FLAG_SITES = upt_flag.UPT_FLAG_SITES;
         /// <summary>Guard: a displacement passes the bound.</summary>
-        public const uint UPT_FLAG_BOUND = 32;
+        public const upt_flag UPT_FLAG_BOUND = upt_flag.UPT_FLAG_BOUND;
         /// <summary>Guard: the state is not finite.</summary>
-        public const uint UPT_FLAG_NON_FINITE = 64;
+        public const upt_flag UPT_FLAG_NON_FINITE = upt_flag.UPT_FLAG_NON_FINITE;
         /// <summary>An element at the contact is inverted; with `check_inversion` any element, and the guard refuses the state.</summary>
-        public const uint UPT_FLAG_INVERTED = 128;
+        public const upt_flag UPT_FLAG_INVERTED = upt_flag.UPT_FLAG_INVERTED;
         /// <summary>Guard: the displacement grew too much in one step.</summary>
-        public const uint UPT_FLAG_GROWTH = 256;
+        public const upt_flag UPT_FLAG_GROWTH = upt_flag.UPT_FLAG_GROWTH;
         /// <summary>The learned correction was bounded.</summary>
-        public const uint UPT_FLAG_CLAMPED = 512;
+        public const upt_flag UPT_FLAG_CLAMPED = upt_flag.UPT_FLAG_CLAMPED;
         /// <summary>The contact block was nearly singular and was regularised.</summary>
-        public const uint UPT_FLAG_REGULARISED = 1024;
+        public const upt_flag UPT_FLAG_REGULARISED = upt_flag.UPT_FLAG_REGULARISED;
         /// <summary>
         /// The corrections ended with inverted elements, or had lost the contact of an instrument: the step's first guess or the linear response
         /// took their place.
         /// </summary>
-        public const uint UPT_FLAG_FELL_BACK = 2048;
+        public const upt_flag UPT_FLAG_FELL_BACK = upt_flag.UPT_FLAG_FELL_BACK;
         /// <summary>The estimated error is above the scene's `error_limit_mm`.</summary>
-        public const uint UPT_FLAG_ERROR = 4096;
+        public const upt_flag UPT_FLAG_ERROR = upt_flag.UPT_FLAG_ERROR;
         /// <summary>Tissue lies more than 1 mm inside an instrument, or an instrument in the tissue.</summary>
-        public const uint UPT_FLAG_DEEP = 8192;
+        public const upt_flag UPT_FLAG_DEEP = upt_flag.UPT_FLAG_DEEP;
         /// <summary>The contact solve was cut short by its bounds or the budget and left more than 0.01 mm (`residual_mm` of the readings).</summary>
-        public const uint UPT_FLAG_UNSOLVED = 16384;
+        public const upt_flag UPT_FLAG_UNSOLVED = upt_flag.UPT_FLAG_UNSOLVED;
         /// <summary>The bundle's tissue relaxes, and this scene makes no corrections, which alone know of it: what it shows and feels is elastic.</summary>
-        public const uint UPT_FLAG_ELASTIC = 32768;
+        public const upt_flag UPT_FLAG_ELASTIC = upt_flag.UPT_FLAG_ELASTIC;
         /// <summary>Nodes of the surface.</summary>
-        public const int UPT_SET_SURFACE_NODES = 0;
+        public const upt_index_set UPT_SET_SURFACE_NODES = upt_index_set.UPT_SET_SURFACE_NODES;
         /// <summary>Nodes that instruments may touch.</summary>
-        public const int UPT_SET_DOMAIN_NODES = 1;
+        public const upt_index_set UPT_SET_DOMAIN_NODES = upt_index_set.UPT_SET_DOMAIN_NODES;
         /// <summary>Nodes held at zero under the bundle's boundary condition.</summary>
-        public const int UPT_SET_FIXED_NODES = 2;
+        public const upt_index_set UPT_SET_FIXED_NODES = upt_index_set.UPT_SET_FIXED_NODES;
         /// <summary>Surface triangles, 3 node indices each, outward.</summary>
-        public const int UPT_SET_SURFACE_FACES = 3;
+        public const upt_index_set UPT_SET_SURFACE_FACES = upt_index_set.UPT_SET_SURFACE_FACES;
         /// <summary>Triangles that instruments may touch, 3 node indices each, outward.</summary>
-        public const int UPT_SET_DOMAIN_FACES = 4;
+        public const upt_index_set UPT_SET_DOMAIN_FACES = upt_index_set.UPT_SET_DOMAIN_FACES;
         /// <summary>Tetrahedra, 4 node indices each, positive volume.</summary>
-        public const int UPT_SET_TETS = 5;
+        public const upt_index_set UPT_SET_TETS = upt_index_set.UPT_SET_TETS;
         /// <summary>The region's nodes in its order; all nodes where there is no region.</summary>
-        public const int UPT_VIEW_REGION = 0;
+        public const upt_view_kind UPT_VIEW_REGION = upt_view_kind.UPT_VIEW_REGION;
         /// <summary>The attached points.</summary>
-        public const int UPT_VIEW_POINTS = 1;
+        public const upt_view_kind UPT_VIEW_POINTS = upt_view_kind.UPT_VIEW_POINTS;
         /// <summary>The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.</summary>
-        public const int UPT_VIEW_SURFACE = 2;
+        public const upt_view_kind UPT_VIEW_SURFACE = upt_view_kind.UPT_VIEW_SURFACE;
         /// <summary>An instrument's shape: a capsule along local y.</summary>
-        public const int UPT_SHAPE_CAPSULE = 0;
+        public const upt_shape UPT_SHAPE_CAPSULE = upt_shape.UPT_SHAPE_CAPSULE;
         /// <summary>An instrument's shape: a box.</summary>
-        public const int UPT_SHAPE_BOX = 1;
+        public const upt_shape UPT_SHAPE_BOX = upt_shape.UPT_SHAPE_BOX;
         /// <summary>An instrument's shape: a box with rounded corners.</summary>
-        public const int UPT_SHAPE_SPATULA = 2;
+        public const upt_shape UPT_SHAPE_SPATULA = upt_shape.UPT_SHAPE_SPATULA;
         /// <summary>An instrument's shape: a hull from `upt_hull_create`.</summary>
-        public const int UPT_SHAPE_HULL = 3;
+        public const upt_shape UPT_SHAPE_HULL = upt_shape.UPT_SHAPE_HULL;
         /// <summary>An instrument's shape: a ball of `radius`.</summary>
-        public const int UPT_SHAPE_SPHERE = 4;
+        public const upt_shape UPT_SHAPE_SPHERE = upt_shape.UPT_SHAPE_SPHERE;
         /// <summary>An instrument pushes, with Coulomb friction.</summary>
-        public const int UPT_MODE_SLIDE = 0;
+        public const upt_mode UPT_MODE_SLIDE = upt_mode.UPT_MODE_SLIDE;
         /// <summary>
         /// An instrument grasps what lies within 0.5 mm of it when the mode changes to this, and holds it until the mode changes back
         /// or the grasp tears off.
         /// </summary>
-        public const int UPT_MODE_GRASP = 1;
+        public const upt_mode UPT_MODE_GRASP = upt_mode.UPT_MODE_GRASP;
         /// <summary>A tie's far end is in the mesh's frame, which goes with the support.</summary>
-        public const int UPT_END_SUPPORT = 0;
+        public const upt_end UPT_END_SUPPORT = upt_end.UPT_END_SUPPORT;
         /// <summary>A tie's far end is in the world, which is the mesh's frame where no support moves.</summary>
-        public const int UPT_END_WORLD = 1;
+        public const upt_end UPT_END_WORLD = upt_end.UPT_END_WORLD;
         /// <summary>A tie's far end is on an instrument.</summary>
-        public const int UPT_END_INSTRUMENT = 2;
+        public const upt_end UPT_END_INSTRUMENT = upt_end.UPT_END_INSTRUMENT;
         /// <summary>A tie's far end is another point of the tissue: a suture.</summary>
-        public const int UPT_END_TISSUE = 3;
+        public const upt_end UPT_END_TISSUE = upt_end.UPT_END_TISSUE;
         /// <summary>Version of the C ABI that `upt_abi_version` returns. Bindings compare it at load.</summary>
         public const uint UPT_ABI_VERSION = 1;
 
@@ -857,7 +1127,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_STATE` when the library was started with other options, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_init(upt_init_options* options);
+        public static extern upt_status upt_init(upt_init_options* options);
 
         /// <summary>
         /// Shuts the library down. Call it before the process exits if you used a GPU provider.
@@ -866,7 +1136,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_STATE` while models or scenes exist.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_shutdown();
+        public static extern upt_status upt_shutdown();
 
         /// <summary>
         /// The library's version, for instance "0.1.0".
@@ -898,7 +1168,7 @@ namespace Upt.Interop
         /// Threads: any.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern byte* upt_status_name(int status);
+        public static extern byte* upt_status_name(upt_status status);
 
         /// <summary>
         /// Sets the function that receives log messages; NULL removes it. When the call returns, the former receiver is no longer
@@ -913,7 +1183,7 @@ namespace Upt.Interop
         /// `tracing` subscriber of its own.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_set_log(IntPtr callback, IntPtr user, int level);
+        public static extern upt_status upt_set_log(IntPtr callback, IntPtr user, upt_log_level level);
 
         /// <summary>
         /// Lists the providers as JSON: `[{"name":"cpu","available":true,"reason":""}]`. Loads ONNX Runtime.
@@ -925,7 +1195,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_RUNTIME`, `UPT_ERR_ARGUMENT` if capacity is too small, `UPT_ERR_NULL`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_providers(byte* @out, ulong capacity, ulong* needed);
+        public static extern upt_status upt_providers(byte* @out, ulong capacity, ulong* needed);
 
         /// <summary>
         /// Opens a bundle, checks it (sizes, dtypes, the SHA-256 of the manifest and of every file that is read) and makes it
@@ -940,7 +1210,7 @@ namespace Upt.Interop
         /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NULL`, `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_create(byte* path, upt_model_options* options, IntPtr* @out);
+        public static extern upt_status upt_model_create(byte* path, upt_model_options* options, IntPtr* @out);
 
         /// <summary>
         /// Closes a model. Its scenes keep what they need and stay usable.
@@ -949,7 +1219,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was closed before).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_destroy(IntPtr model);
+        public static extern upt_status upt_model_destroy(IntPtr model);
 
         /// <summary>
         /// Describes a model in numbers. Set `out-&gt;struct_size` first.
@@ -958,7 +1228,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_read_info(IntPtr model, upt_model_info* @out);
+        public static extern upt_status upt_model_read_info(IntPtr model, upt_model_info* @out);
 
         /// <summary>
         /// Describes a model as JSON: name, bundle hash, the provider of each stage and why the others were not chosen.
@@ -970,7 +1240,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` if capacity is too small.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_describe(IntPtr model, byte* @out, ulong capacity, ulong* needed);
+        public static extern upt_status upt_model_describe(IntPtr model, byte* @out, ulong capacity, ulong* needed);
 
         /// <summary>
         /// Copies the rest positions.
@@ -982,7 +1252,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` when count is not 3 K.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_read_positions(IntPtr model, float* @out, ulong count);
+        public static extern upt_status upt_model_read_positions(IntPtr model, float* @out, ulong count);
 
         /// <summary>
         /// Copies a static index set.
@@ -996,7 +1266,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (unknown set, capacity too small).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_read_indices(IntPtr model, int set, uint* @out, ulong capacity, ulong* needed);
+        public static extern upt_status upt_model_read_indices(IntPtr model, upt_index_set set, uint* @out, ulong capacity, ulong* needed);
 
         /// <summary>
         /// Names a support group of a bundle, and copies its nodes: what `upt_input.supports` moves.
@@ -1011,7 +1281,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such group, a capacity too small).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_read_support(IntPtr model, uint group, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
+        public static extern upt_status upt_model_read_support(IntPtr model, uint group, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
 
         /// <summary>
         /// Names a region of the surface that the bundle names, and copies its nodes: what `upt_pressure.nodes` takes.
@@ -1026,7 +1296,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` (no such region, a capacity too small).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_model_read_region(IntPtr model, uint region, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
+        public static extern upt_status upt_model_read_region(IntPtr model, uint region, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
 
         /// <summary>
         /// Creates a scene at rest.
@@ -1039,7 +1309,7 @@ namespace Upt.Interop
         /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_create(IntPtr model, upt_scene_options* options, IntPtr* @out);
+        public static extern upt_status upt_scene_create(IntPtr model, upt_scene_options* options, IntPtr* @out);
 
         /// <summary>
         /// Destroys a scene, after waiting for a step in flight. A poisoned scene accepts only this call and
@@ -1050,7 +1320,7 @@ namespace Upt.Interop
         /// a call on it.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_destroy(IntPtr scene);
+        public static extern upt_status upt_scene_destroy(IntPtr scene);
 
         /// <summary>
         /// Returns the scene to rest, a cut body to the intact one. The region and the attached points stay.
@@ -1059,7 +1329,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`; of a cut body also `UPT_ERR_RUNTIME` and `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_reset(IntPtr scene);
+        public static extern upt_status upt_scene_reset(IntPtr scene);
 
         /// <summary>
         /// One step of the scene's `dt`, as `input` drives it.
@@ -1082,7 +1352,7 @@ namespace Upt.Interop
         /// `UPT_ERR_BUSY`, `UPT_ERR_GUARD`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; the state does not change.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_step(IntPtr scene, upt_input* input, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_step(IntPtr scene, upt_input* input, float* @out, ulong out_count);
 
         /// <summary>
         /// One step of dense fields, `u(t), c(t) -&gt; u(t + dt)`, as the paper writes it: `upt_scene_step` with `displacement` and `collision`.
@@ -1097,7 +1367,7 @@ namespace Upt.Interop
         /// not change.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_step_field(IntPtr scene, float* displacement, float* collision, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_step_field(IntPtr scene, float* displacement, float* collision, float* @out, ulong out_count);
 
         /// <summary>
         /// Copies the last published state.
@@ -1109,7 +1379,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read(IntPtr scene, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_read(IntPtr scene, float* @out, ulong out_count);
 
         /// <summary>
         /// Starts a step on the scene's worker thread and returns at once. An error of an earlier step that was not reported yet
@@ -1124,7 +1394,7 @@ namespace Upt.Interop
         /// `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_submit(IntPtr scene, upt_input* input);
+        public static extern upt_status upt_scene_submit(IntPtr scene, upt_input* input);
 
         /// <summary>
         /// Asks whether the submitted step has finished. Never waits.
@@ -1137,7 +1407,7 @@ namespace Upt.Interop
         /// Errors: the step's; `UPT_ERR_STATE` when nothing was submitted, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_poll(IntPtr scene);
+        public static extern upt_status upt_scene_poll(IntPtr scene);
 
         /// <summary>
         /// Waits for the submitted step, at most `timeout_ms` milliseconds.
@@ -1148,7 +1418,7 @@ namespace Upt.Interop
         /// Errors: as `upt_scene_poll`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_wait(IntPtr scene, uint timeout_ms);
+        public static extern upt_status upt_scene_wait(IntPtr scene, uint timeout_ms);
 
         /// <summary>
         /// Interpolates between the last two states, for frames between steps. Works while a step is in flight.
@@ -1161,7 +1431,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_sample(IntPtr scene, double alpha, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_sample(IntPtr scene, double alpha, float* @out, ulong out_count);
 
         /// <summary>
         /// Limits a step to these nodes: `upt_scene_step`, `_read` and `_sample` write them alone, in this order. Fewer nodes
@@ -1174,7 +1444,7 @@ namespace Upt.Interop
         /// them, `UPT_ERR_UNSUPPORTED` for a cut body, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_set_region(IntPtr scene, uint* nodes, ulong count);
+        public static extern upt_status upt_scene_set_region(IntPtr scene, uint* nodes, ulong count);
 
         /// <summary>
         /// Decodes any nodes of the last state, in the region or not.
@@ -1188,7 +1458,7 @@ namespace Upt.Interop
         /// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_decode(IntPtr scene, uint* nodes, ulong count, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_decode(IntPtr scene, uint* nodes, ulong count, float* @out, ulong out_count);
 
         /// <summary>
         /// Attaches points to the tissue. They replace those attached before. A bundle of kind `upt` decodes each point in every
@@ -1202,7 +1472,7 @@ namespace Upt.Interop
         /// `UPT_ERR_UNSUPPORTED`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_attach_points(IntPtr scene, float* points, ulong count);
+        public static extern upt_status upt_scene_attach_points(IntPtr scene, float* points, ulong count);
 
         /// <summary>
         /// Copies the displacement of the attached points in the last state.
@@ -1215,7 +1485,7 @@ namespace Upt.Interop
         /// `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_points(IntPtr scene, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_read_points(IntPtr scene, float* @out, ulong out_count);
 
         /// <summary>
         /// As `upt_scene_sample`, at the attached points.
@@ -1228,7 +1498,7 @@ namespace Upt.Interop
         /// Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_sample_points(IntPtr scene, double alpha, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_sample_points(IntPtr scene, double alpha, float* @out, ulong out_count);
 
         /// <summary>
         /// Copies the force, torque and penetration of each instrument at the end of the last step.
@@ -1241,7 +1511,7 @@ namespace Upt.Interop
         /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of instruments.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_instruments(IntPtr scene, upt_instrument_reading* @out, ulong count);
+        public static extern upt_status upt_scene_read_instruments(IntPtr scene, upt_instrument_reading* @out, ulong count);
 
         /// <summary>
         /// Copies the points of the surface that pushed or held instruments at the end of the last step, ascending by instrument.
@@ -1254,7 +1524,7 @@ namespace Upt.Interop
         /// `UPT_ERR_ARGUMENT` if capacity is too small.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_instrument_contacts(IntPtr scene, upt_instrument_contact* @out, ulong capacity, ulong* needed);
+        public static extern upt_status upt_scene_read_instrument_contacts(IntPtr scene, upt_instrument_contact* @out, ulong capacity, ulong* needed);
 
         /// <summary>
         /// Creates the shape of a tool of your own, for `UPT_SHAPE_HULL`: a closed surface of triangles with all its hollows, or the convex hull of points.
@@ -1272,7 +1542,7 @@ namespace Upt.Interop
         /// `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_hull_create(float* points, ulong point_count, uint* faces, ulong face_count, IntPtr* @out);
+        public static extern upt_status upt_hull_create(float* points, ulong point_count, uint* faces, ulong face_count, IntPtr* @out);
 
         /// <summary>
         /// Destroys a hull. Steps that were submitted with it keep what they need.
@@ -1281,7 +1551,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE` (also if it was destroyed before).
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_hull_destroy(IntPtr hull);
+        public static extern upt_status upt_hull_destroy(IntPtr hull);
 
         /// <summary>
         /// Copies what each tie of the last step does at its end.
@@ -1294,7 +1564,7 @@ namespace Upt.Interop
         /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_ARGUMENT` if the last step had another number of ties.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_ties(IntPtr scene, upt_tie_reading* @out, ulong count);
+        public static extern upt_status upt_scene_read_ties(IntPtr scene, upt_tie_reading* @out, ulong count);
 
         /// <summary>
         /// Finds the points of the tissue nearest to places, for ties: of the domain, the surface that instruments may touch, where it is in the last state.
@@ -1307,7 +1577,7 @@ namespace Upt.Interop
         /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_UNSUPPORTED` for a cut body and in a build without feature "instruments"; nothing is written then.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_tie_points(IntPtr scene, float* places, ulong count, uint* nodes, float* weights);
+        public static extern upt_status upt_scene_tie_points(IntPtr scene, float* places, ulong count, uint* nodes, float* weights);
 
         /// <summary>
         /// Makes a bed: a tie at each free node of the domain within a region, from where the node is in the last state. Pass them in every step; a bed tears node by node.
@@ -1322,7 +1592,7 @@ namespace Upt.Interop
         /// `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_bed(IntPtr scene, upt_bed* bed, upt_tie* ties, ulong capacity, ulong* needed);
+        public static extern upt_status upt_scene_bed(IntPtr scene, upt_bed* bed, upt_tie* ties, ulong capacity, ulong* needed);
 
         /// <summary>
         /// Cuts along the way of a blade's edge through the tissue as it is now. Elements that the blade touches become two, with copies of
@@ -1345,7 +1615,7 @@ namespace Upt.Interop
         /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_cut(IntPtr scene, uint stroke, float* points, ulong pose_count, ulong edge_count, upt_cut* @out);
+        public static extern upt_status upt_scene_cut(IntPtr scene, uint stroke, float* points, ulong pose_count, ulong edge_count, upt_cut* @out);
 
         /// <summary>
         /// Cuts as `upt_scene_cut`, by a blade that feels the tissue and that the tissue feels.
@@ -1363,7 +1633,7 @@ namespace Upt.Interop
         /// scene is then what it was.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_cut_with(IntPtr scene, upt_blade* blade, uint stroke, float* points, ulong pose_count, ulong edge_count, upt_cut* @out);
+        public static extern upt_status upt_scene_cut_with(IntPtr scene, upt_blade* blade, uint stroke, float* points, ulong pose_count, ulong edge_count, upt_cut* @out);
 
         /// <summary>
         /// Removes what lies inside of an instrument, the deepest first, up to a volume: an aspirator with a rate takes that times the step. Elements go in 64 parts
@@ -1379,7 +1649,7 @@ namespace Upt.Interop
         /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_remove(IntPtr scene, upt_instrument* instrument, float most_mm3, upt_cut* @out);
+        public static extern upt_status upt_scene_remove(IntPtr scene, upt_instrument* instrument, float most_mm3, upt_cut* @out);
 
         /// <summary>
         /// Multiplies the stiffness of elements of the model's mesh: coagulation, oedema, softening. What `upt_scene_cut` says of a cut scene holds.
@@ -1393,7 +1663,7 @@ namespace Upt.Interop
         /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_scale_stiffness(IntPtr scene, uint* elements, ulong count, float factor, upt_cut* @out);
+        public static extern upt_status upt_scene_scale_stiffness(IntPtr scene, uint* elements, ulong count, float factor, upt_cut* @out);
 
         /// <summary>
         /// Takes the pieces that nothing holds out of the body.
@@ -1405,7 +1675,7 @@ namespace Upt.Interop
         /// `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then what it was.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_drop_fragments(IntPtr scene, upt_cut* @out);
+        public static extern upt_status upt_scene_drop_fragments(IntPtr scene, upt_cut* @out);
 
         /// <summary>
         /// Writes how many nodes the scene has now: K, and the copies that cuts have made. Wherever this header says K of a scene, it is this number. It
@@ -1415,7 +1685,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` for a place that is not aligned, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_node_count(IntPtr scene, ulong* @out);
+        public static extern upt_status upt_scene_read_node_count(IntPtr scene, ulong* @out);
 
         /// <summary>
         /// Brings the closed surface of the body up to date: the mesh's own where nothing has happened, the lips of cuts, and what removal has laid
@@ -1432,7 +1702,7 @@ namespace Upt.Interop
         /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_update_surface(IntPtr scene, upt_surface* @out);
+        public static extern upt_status upt_scene_update_surface(IntPtr scene, upt_surface* @out);
 
         /// <summary>
         /// Copies the surface as the last `upt_scene_update_surface` left it, with the counts that it gave. An array that is NULL is not wanted.
@@ -1447,7 +1717,7 @@ namespace Upt.Interop
         /// `UPT_ERR_NULL` for the scene, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_surface(IntPtr scene, float* rest, ulong vertex_count, uint* triangles, byte* inside, ulong triangle_count, uint* changed, ulong changed_count);
+        public static extern upt_status upt_scene_read_surface(IntPtr scene, float* rest, ulong vertex_count, uint* triangles, byte* inside, ulong triangle_count, uint* changed, ulong changed_count);
 
         /// <summary>
         /// Copies where the vertices of the surface are in the last published state.
@@ -1460,7 +1730,7 @@ namespace Upt.Interop
         /// with a region, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_surface_positions(IntPtr scene, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_read_surface_positions(IntPtr scene, float* @out, ulong out_count);
 
         /// <summary>
         /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
@@ -1489,7 +1759,7 @@ namespace Upt.Interop
         /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_present(IntPtr scene, upt_input* input, double when, upt_view* view, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_present(IntPtr scene, upt_input* input, double when, upt_view* view, float* @out, ulong out_count);
 
         /// <summary>
         /// Lets a hand feel a tool: from now on, each step of the scene prepares what `upt_haptics_render` needs.
@@ -1507,7 +1777,7 @@ namespace Upt.Interop
         /// corrections; `UPT_ERR_RUNTIME`, `UPT_ERR_IO`, `UPT_ERR_BUNDLE`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_haptics_create(IntPtr scene, upt_haptics_options* options, IntPtr* @out);
+        public static extern upt_status upt_haptics_create(IntPtr scene, upt_haptics_options* options, IntPtr* @out);
 
         /// <summary>
         /// The force on the tool at a pose, with contact solved on what the last step prepared. Made for 1,000 calls a second.
@@ -1525,7 +1795,7 @@ namespace Upt.Interop
         /// the scene was destroyed; `UPT_ERR_UNSUPPORTED` in a build without feature "instruments"; `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_haptics_render(IntPtr haptics, upt_haptic_pose* pose, upt_haptic_force* @out);
+        public static extern upt_status upt_haptics_render(IntPtr haptics, upt_haptic_pose* pose, upt_haptic_force* @out);
 
         /// <summary>
         /// Destroys a haptics object. Its scene stays usable.
@@ -1535,7 +1805,7 @@ namespace Upt.Interop
         /// a call on it, `UPT_ERR_UNSUPPORTED` in a build without feature "instruments".
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_haptics_destroy(IntPtr haptics);
+        public static extern upt_status upt_haptics_destroy(IntPtr haptics);
 
         /// <summary>
         /// Finds the nodes that rigid instruments touch, and the displacement that they impose there: the input of a step.
@@ -1554,7 +1824,7 @@ namespace Upt.Interop
         /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_contacts_from_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count, uint* contact_nodes, float* contact_vectors, ulong capacity, ulong* contact_count);
+        public static extern upt_status upt_scene_contacts_from_instruments(IntPtr scene, upt_instrument* instruments, ulong instrument_count, uint* contact_nodes, float* contact_vectors, ulong capacity, ulong* contact_count);
 
         /// <summary>
         /// Copies the reaction of the tissue at the last step's contact nodes, in their order.
@@ -1572,7 +1842,7 @@ namespace Upt.Interop
         /// `UPT_ERR_ARGUMENT`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`; `UPT_ERR_UNSUPPORTED` also for a cut body.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_contact_force(IntPtr scene, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_read_contact_force(IntPtr scene, float* @out, ulong out_count);
 
         /// <summary>
         /// Reports what the last step did. Set `out-&gt;struct_size` first. Works while a step is in flight and
@@ -1582,7 +1852,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_stats(IntPtr scene, upt_scene_stats* @out);
+        public static extern upt_status upt_scene_read_stats(IntPtr scene, upt_scene_stats* @out);
 
         /// <summary>
         /// Reports how long the last step and its stages took. Set `out-&gt;struct_size` first. Works as `upt_scene_read_stats` does.
@@ -1591,7 +1861,7 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_read_timing(IntPtr scene, upt_scene_timing* @out);
+        public static extern upt_status upt_scene_read_timing(IntPtr scene, upt_scene_timing* @out);
 
         /// <summary>
         /// Saves the state, so that it can be restored exactly.
@@ -1605,7 +1875,7 @@ namespace Upt.Interop
         /// `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_save(IntPtr scene, byte* @out, ulong capacity, ulong* needed);
+        public static extern upt_status upt_scene_save(IntPtr scene, byte* @out, ulong capacity, ulong* needed);
 
         /// <summary>
         /// Restores a snapshot of the same model.
@@ -1616,7 +1886,7 @@ namespace Upt.Interop
         /// haptics; the state does not change.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_restore(IntPtr scene, byte* bytes, ulong count);
+        public static extern upt_status upt_scene_restore(IntPtr scene, byte* bytes, ulong count);
 
         /// <summary>
         /// Begins to record what the scene is given: steps, submitted ones when they are made, cuts and what is like them, resets, restored snapshots and
@@ -1630,7 +1900,7 @@ namespace Upt.Interop
         /// with a budget of time or with a mesh of its own; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_record(IntPtr scene, uint every);
+        public static extern upt_status upt_scene_record(IntPtr scene, uint every);
 
         /// <summary>
         /// Copies the lines of the recording that were not taken before, and forgets them. One after the other they make the file: take them now and then in a long
@@ -1644,6 +1914,6 @@ namespace Upt.Interop
         /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT` if capacity is too small, `UPT_ERR_PANIC`; the lines stay.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern int upt_scene_take_record(IntPtr scene, byte* @out, ulong capacity, ulong* needed);
+        public static extern upt_status upt_scene_take_record(IntPtr scene, byte* @out, ulong capacity, ulong* needed);
     }
 }

@@ -30,7 +30,7 @@ namespace Upt.Interop
                 while (needed > 0)
                 {
                     byte[] lines = new byte[needed];
-                    int status;
+                    upt_status status;
                     fixed (byte* l = lines) status = Native.upt_scene_take_record(scene, l, (ulong)lines.Length, &needed);
                     // A step in flight may have added a line.
                     if (status == Native.UPT_ERR_ARGUMENT && needed > (ulong)lines.Length) continue;

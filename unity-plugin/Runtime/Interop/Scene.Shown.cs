@@ -45,7 +45,7 @@ namespace Upt.Interop
         /// surface (<c>UPT_VIEW_*</c>). The moment is on the clock of the steps' times, or without one the time since the last
         /// published step, s. Throws <c>UPT_ERR_UNSUPPORTED</c> where the scene does not correct. The pointer may be a
         /// <c>NativeArray</c>'s.</summary>
-        public void Present(StepInput input, double when, int view, float* output, int floats)
+        public void Present(StepInput input, double when, upt_view_kind view, float* output, int floats)
         {
             input.Require(NodeCount);
             upt_view shown = default(upt_view);

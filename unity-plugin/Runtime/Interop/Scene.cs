@@ -132,7 +132,7 @@ namespace Upt.Interop
             IntPtr scene = Enter();
             try
             {
-                int status = Native.upt_scene_poll(scene);
+                upt_status status = Native.upt_scene_poll(scene);
                 Status.Check(status);
                 return status != Native.UPT_PENDING;
             }
@@ -145,7 +145,7 @@ namespace Upt.Interop
             IntPtr scene = Enter();
             try
             {
-                int status = Native.upt_scene_wait(scene, timeoutMilliseconds);
+                upt_status status = Native.upt_scene_wait(scene, timeoutMilliseconds);
                 Status.Check(status);
                 return status != Native.UPT_PENDING;
             }

@@ -6,9 +6,9 @@ namespace Upt.Interop
     public sealed class UptException : Exception
     {
         /// <summary>The status, one of <c>Native.UPT_ERR_*</c>.</summary>
-        public int Status { get; private set; }
+        public upt_status Status { get; private set; }
 
-        public UptException(int status, string message) : base(message)
+        public UptException(upt_status status, string message) : base(message)
         {
             Status = status;
         }
@@ -17,12 +17,12 @@ namespace Upt.Interop
     internal static unsafe class Status
     {
         /// <summary>Throws when <paramref name="status"/> is an error (negative).</summary>
-        public static void Check(int status)
+        public static void Check(upt_status status)
         {
             if (status < 0) Throw(status);
         }
 
-        private static void Throw(int status)
+        private static void Throw(upt_status status)
         {
             string name = Utf8.Decode(Native.upt_status_name(status));
             string text = Utf8.Decode(Native.upt_last_error());
