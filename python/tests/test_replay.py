@@ -20,7 +20,7 @@ def test_a_recorder_writes_what_the_scene_was_given(tmp_path):
         field = scene.step([ball], loads=upt.Loads(gravity=(0, 0, -1), pressures=[(None, 100.0)]))
         with pytest.raises(upt.StateError, match="a recording is on"):
             scene.record()
-        with pytest.raises(upt.ArgumentError):
+        with pytest.raises(upt.BundleError):
             scene.restore(b"nothing")
         scene.reset()
     recorder.close()

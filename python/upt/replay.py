@@ -41,7 +41,7 @@ class Recorded:
             room = ctypes.create_string_buffer(needed.value)
             status = lib.upt_scene_take_record(self._handle, room, len(room), ctypes.byref(needed))
             # A step in flight may have added a line.
-            if status == Status.ERR_ARGUMENT and needed.value > len(room):
+            if status == Status.ARGUMENT and needed.value > len(room):
                 continue
             check(status)
             return room.raw[: needed.value]

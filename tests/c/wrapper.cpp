@@ -216,8 +216,21 @@ int main(int argc, char **argv) {
   EXPECT_TRUE(scene.stats().step_count == 1);
 
   const std::vector<std::uint8_t> snapshot = scene.save();
+  EXPECT(scene.record(), UPT_OK);
   EXPECT(scene.step_field(nullptr, nullptr, field), UPT_OK);
   EXPECT(scene.restore(snapshot), UPT_OK);
+  EXPECT_TRUE(thrown([&] { scene.record(); }) == UPT_ERR_STATE);
+  EXPECT(scene.record(0), UPT_OK);
+  std::string lines = "# before\n";
+  EXPECT(scene.take_record(lines), UPT_OK);
+  // The state in which it began, the step, the restored state, the end.
+  EXPECT_TRUE(lines.compare(0, 25, "# before\n{\"upt_replay\":2,") == 0);
+  EXPECT_TRUE(lines.find("\n{\"restore\":\"") < lines.find("\n{\"step\":{"));
+  const std::string end = "\n{\"end\":3}\n";
+  EXPECT_TRUE(lines.compare(lines.size() - end.size(), end.size(), end) == 0);
+  const std::size_t size = lines.size();
+  EXPECT(scene.take_record(lines), UPT_OK);
+  EXPECT_TRUE(lines.size() == size);
   EXPECT(scene.read(same), UPT_OK);
   EXPECT_TRUE(same[3 * nodes[0] + 2] == -1.0F);
 

@@ -2,7 +2,7 @@
 // `N passed, N failed, N skipped`.
 import assert from "node:assert/strict";
 import { File } from "node:buffer";
-import { readFileSync, readdirSync } from "node:fs";
+import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { press } from "./press.mjs";
 
@@ -79,6 +79,30 @@ const tests = {
       // Rounding that corrections carry on, and that contact may turn into another point of contact for a step.
       assert.ok(middle < 5e-3 && Math.max(...shown) < 0.1, `${name}, ${corrections} corrections: ${middle} mm`);
     }
+  },
+
+  // Read again by the native command: tests/web/run.sh.
+  async a_portable_scene_records_itself() {
+    const upt = await start();
+    const model = await upt.open(bundle(LIVER), { portable: true });
+    const scene = model.scene({ corrections: 3 });
+    const node = 3 * model.indices("domainNodes")[0];
+    const [x, y, z] = model.positions().subarray(node, node + 3);
+    scene.record();
+    for (let t = 0; t < 4; t += 1) {
+      scene.step([{ shape: "sphere", radius: 6, position: [x, y, z + 6 - t], friction: 0.3 }]);
+      if (t === 1) scene.cut([[[x - 20, y + 9, z + 10], [x + 20, y + 9, z + 10]], [[x - 20, y + 9, z - 12], [x + 20, y + 9, z - 12]]]);
+    }
+    const first = scene.takeRecord();
+    scene.record(0);
+    const file = first + scene.takeRecord();
+    assert.equal(scene.takeRecord(), "");
+    const lines = file.trim().split("\n").map(JSON.parse);
+    assert.equal(lines.length, 7);
+    assert.ok(lines[0].portable && lines[3].cut && lines[5].step.sha256);
+    assert.deepEqual(lines[6], { end: 5 });
+    writeFileSync(join(native, "module.replay"), file);
+    assert.throws(() => scene.record(0), refused("UPT_ERR_STATE", /no recording is on/));
   },
 
   async damaged_bundles_are_refused_in_the_librarys_words() {

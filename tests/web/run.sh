@@ -43,6 +43,12 @@ add() {
 }
 echo "== in Node"
 add node tests/web/node.mjs "$root" "$UPT_WASM" "$build"
+upt="${UPT_PROGRAM:-$root/target/release/upt}"
+if [ -x "$upt" ]; then
+  check "what the module records has the bits of $(uname -m)'s" "$upt" replay "$build/module.replay" --bundle onnx/liver-coarse --verify
+else
+  leave_out 1 "a recording of the module: $upt is not there"
+fi
 echo "== in a browser"
 add python3 tests/web/page.py "$UPT_SITE"
 

@@ -227,9 +227,16 @@ namespace Upt.Tests
                     scene.Step(StepInput.OfContacts(nodes, vectors, Push(model, step, nodes, vectors)), null);
                 byte[] snapshot = scene.Save();
                 int count = Push(model, 11, nodes, vectors);
+                scene.Record();
                 scene.Step(StepInput.OfContacts(nodes, vectors, count), first);
                 scene.Reset();
                 scene.Restore(snapshot);
+                scene.EndRecord();
+                string[] lines = System.Text.Encoding.UTF8.GetString(scene.TakeRecord()).Split('\n');
+                Assert.That(lines[0], Is.StringStarting("{\"upt_replay\":2,"));
+                Assert.That(lines[2], Is.StringStarting("{\"step\":{\"contact\":{\"nodes\":["));
+                Assert.That(lines[3] + lines[5], Is.EqualTo("{\"reset\":{}}{\"end\":4}"));
+                Assert.That(scene.TakeRecord(), Is.Empty);
                 scene.Step(StepInput.OfContacts(nodes, vectors, count), second);
                 Assert.That(second, Is.EqualTo(first));
                 snapshot[snapshot.Length / 2] ^= 0x40;
