@@ -208,14 +208,20 @@ fn is_told(level: i32) -> bool {
     level <= LEVEL.load(Ordering::Acquire)
 }
 
+/// Crates of whose messages and spans a host is told: the library, its layers, and ONNX Runtime's binding.
+const TOLD: [&str; 13] = [
+    "upt", "ort", "bundle", "contact", "elements", "exchange", "field", "held", "implicit",
+    "kernels", "lanes", "prior", "topology",
+];
+
 struct Forward;
 
 impl Subscriber for Forward {
     fn register_callsite(&self, metadata: &'static Metadata<'static>) -> Interest {
         let crate_name = metadata.target().split("::").next();
-        match crate_name {
-            Some("upt" | "ort") => Interest::sometimes(),
-            _ => Interest::never(),
+        match crate_name.is_some_and(|name| TOLD.contains(&name)) {
+            true => Interest::sometimes(),
+            false => Interest::never(),
         }
     }
 
