@@ -120,7 +120,9 @@ class WithSource(sdist):
         patches = ["[patch.crates-io]"]
         for crate in sorted((scratch / "package").glob("*.crate")):
             with tarfile.open(crate) as archive:
-                archive.extractall(rust, filter="data")
+                # Python before 3.11.4 has no filters, and cargo has just written these.
+                safely = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}
+                archive.extractall(rust, **safely)
             patches.append(f"{crate.stem.rpartition('-')[0]} = {{ path = '{crate.stem}' }}")
         shutil.rmtree(scratch)
         # The layers beside the library, in place of a registry.
