@@ -13,7 +13,7 @@ use super::structs::*;
 /// - `every`: after how many steps the SHA-256 of what `upt_scene_read` gives is written, 1 or more; 0 ends the recording.
 ///
 /// Threads: one at a time.
-/// Errors: `UPT_ERR_STATE` where a recording is on, where none is to be ended, and where the last one has not been taken; `UPT_ERR_UNSUPPORTED` for a scene
+/// Errors: `UPT_ERR_STATE` where a recording is on, where there is none to end, and where the last one has not been taken; `UPT_ERR_UNSUPPORTED` for a scene
 /// with a budget of time or with a mesh of its own; `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_record(scene: *mut upt_scene, every: u32) -> upt_status {

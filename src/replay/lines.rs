@@ -95,9 +95,9 @@ impl Default for SceneFields {
 }
 
 /// A further line.
-#[expect(
+#[allow(
     clippy::large_enum_variant,
-    reason = "most lines are steps, and one is made at a time"
+    reason = "most lines are steps, and one is made at a time; with pointers of 32 bits it is not as large"
 )]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -140,7 +140,7 @@ pub struct Step<'a> {
     /// s.
     #[serde(skip_serializing_if = "is_zero")]
     pub time_s: f64,
-    /// Of the displacement `[n,3]` after the step as `upt_scene_read` gives it: f32, little-endian. The last field: [`super::Recorder`] fills it in.
+    /// Of the displacement `[n,3]` after the step as `upt_scene_read` gives it: f32, little-endian. The last field: the recorder of a scene fills it in.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<Cow<'a, str>>,
 }

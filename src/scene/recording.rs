@@ -33,7 +33,7 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// [`Error::State`] where a recording is on, where none is to be ended, and where the last one has not been taken; [`Error::Unsupported`] for a scene
+    /// [`Error::State`] where a recording is on, where there is none to end, and where the last one has not been taken; [`Error::Unsupported`] for a scene
     /// whose steps depend on the clock, or that has a mesh of its own.
     pub fn record(&self, every: u32) -> Result<()> {
         self.with(|core, published| {

@@ -43,7 +43,9 @@ impl Tool {
     /// A sliding tool without friction: `position` in mm, `rotation` a unit quaternion `[x, y, z, w]`.
     ///
     /// ```
-    /// use upt::{Mode, Shape, Tool};
+    /// use contact::Shape; // `upt` has all of these
+    /// use implicit::Error;
+    /// use implicit::contact::{Mode, Tool};
     ///
     /// let rod = Shape::Capsule { half_length: 20.0, radius: 2.5 };
     /// let mut tool = Tool::new(&rod, [0.0, 0.0, 30.0], [0.0, 0.0, 0.0, 1.0])?;
@@ -51,8 +53,8 @@ impl Tool {
     /// tool.tear_off_mn = 400.0;
     ///
     /// let lost = Tool::new(&rod, [f32::NAN, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]);
-    /// assert!(matches!(lost, Err(upt::Error::NonFinite(_))));
-    /// # upt::Result::Ok(())
+    /// assert!(matches!(lost, Err(Error::NonFinite(_))));
+    /// # implicit::Result::Ok(())
     /// ```
     ///
     /// # Errors

@@ -11,6 +11,7 @@ mod determinism;
 mod dynamics;
 mod failures;
 mod groups;
+#[cfg(feature = "linear")]
 mod laws;
 mod metrics;
 mod stiffness;
