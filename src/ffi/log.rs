@@ -308,6 +308,18 @@ mod tests {
 
     static HEARD: Mutex<Vec<(String, ThreadId)>> = Mutex::new(Vec::new());
 
+    /// A layer that is not in the list is silent.
+    #[test]
+    fn all_layers_are_heard() {
+        let manifest = include_str!("../../Cargo.toml");
+        let layers = manifest.lines().filter_map(|line| {
+            let (name, rest) = line.split_once(" = { package = \"libupt-")?;
+            rest.contains("path = \"crates/").then_some(name)
+        });
+        let silent: Vec<_> = layers.clone().filter(|name| !TOLD.contains(name)).collect();
+        assert!(layers.count() > 8 && silent.is_empty(), "{silent:?}");
+    }
+
     unsafe extern "C" fn hear(_: i32, text: *const c_char, _: *mut c_void) {
         // SAFETY: the log hands over a NUL-terminated text.
         let text = unsafe { CStr::from_ptr(text) }.to_str().unwrap().to_owned();
