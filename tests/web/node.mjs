@@ -234,6 +234,15 @@ const tests = {
     assert.throws(() => step({ ...two, kind: "saw" }), refused("UPT_ERR_ARGUMENT", /kind is saw; it can be press, blade/));
     assert.ok(surgery.undo() && surgery.undo() && surgery.told().areaMm2 === cut.areaMm2);
     assert.equal(surgery.news().hardened.length, 0);
+    // A tool whose stroke was taken back begins another one once it has been lifted.
+    const ball = { ...upright, kind: "aspirator", radius: 5, position: [x, y, z + 20] };
+    step(ball);
+    step();
+    step(ball);
+    assert.ok(surgery.undo(), "the stroke before was lifted");
+    step(ball);
+    assert.deepEqual([surgery.told().removedMm3, surgery.told().undos], [0, 1]);
+    step();
     assert.ok(surgery.undo() && !surgery.undo());
     assert.deepEqual([surgery.told().areaMm2, scene.nodeCount], [0, model.info.node_count]);
   },

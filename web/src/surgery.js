@@ -28,6 +28,7 @@ export class Surgery {
   #changed = false; // since the host was told of the surface
   #last; // the tool of the step before
   #stroke = 0;
+  #waits = false; // until the tool is lifted: its stroke has been taken back
   #pending; // the body before the stroke that goes on, until it has done something
   #effective = false; // the stroke has done something
   #undone = [];
@@ -60,6 +61,11 @@ export class Surgery {
     const last = this.#last;
     this.#last = tool;
     this.force = [0, 0, 0];
+    this.#waits &&= tool !== undefined;
+    if (this.#waits) {
+      this.#last = undefined;
+      return;
+    }
     const goesOn = last !== undefined && tool !== undefined && last.kind === tool.kind;
     if (last && !goesOn) this.#end();
     if (!tool) return;
@@ -172,6 +178,7 @@ export class Surgery {
   }
 
   #stop() {
+    this.#waits ||= this.#last !== undefined;
     this.#last = undefined;
     this.#pending = undefined;
     this.#effective = false;

@@ -70,6 +70,8 @@ pub struct Surgery {
     vertices: usize,
     last: Option<Tool>,
     stroke: u32,
+    /// Until the tool is lifted: its stroke has been taken back.
+    waits: bool,
     /// The body before the stroke that goes on, until it has done something.
     pending: Option<Before>,
     /// The stroke has done something.
@@ -111,6 +113,7 @@ impl Surgery {
             vertices: 0,
             last: None,
             stroke: 0,
+            waits: false,
             pending: None,
             effective: false,
             undone: Vec::new(),
@@ -134,6 +137,11 @@ impl Surgery {
         let tool = tool.filter(|tool| tool.kind != Kind::Press);
         let last = std::mem::replace(&mut self.last, tool);
         self.force = [0.0; 3];
+        self.waits &= tool.is_some();
+        if self.waits {
+            self.last = None;
+            return Ok(());
+        }
         let goes_on = last.zip(tool).filter(|(from, to)| from.kind == to.kind);
         if goes_on.is_none() && last.is_some() {
             self.end(scene)?;
@@ -265,6 +273,7 @@ impl Surgery {
     }
 
     fn stop(&mut self) {
+        self.waits |= self.last.is_some();
         (self.last, self.pending, self.effective) = (None, None, false);
         self.force = [0.0; 3];
         self.changed = self.begun;
