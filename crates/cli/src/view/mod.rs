@@ -12,6 +12,7 @@ mod protocol;
 mod server;
 mod session;
 mod surgery;
+mod undone;
 
 use std::net::TcpListener;
 use std::path::PathBuf;

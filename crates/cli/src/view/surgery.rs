@@ -9,6 +9,7 @@ use upt::contact::PUT_MM;
 use upt::ffi;
 
 use super::protocol::{Kind, SurfaceHeader, Tool};
+use super::undone::{Account, Before, keep};
 use crate::host::{Model, Scene, instrument};
 
 /// Of the blade, from its tip, mm.
@@ -21,40 +22,6 @@ const STILL_MM: f32 = 0.02;
 const RATE: f64 = 500.0;
 /// What coagulation multiplies stiffness by, once an element.
 const HARDER: f32 = 4.0;
-/// Strokes that can be undone, and the bytes that bodies before them hold: the last one stays, however large.
-const MOST_UNDONE: usize = 16;
-const MOST_UNDONE_BYTES: usize = 64 << 20;
-
-/// What all strokes so far have done.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Account {
-    pub area_mm2: f32,
-    pub removed_mm3: f32,
-    pub copies: u32,
-}
-
-/// A body before a stroke.
-struct Before {
-    snapshot: Vec<u8>,
-    account: Account,
-    hard: Vec<bool>,
-}
-
-impl Before {
-    fn bytes(&self) -> usize {
-        self.snapshot.len() + self.hard.len()
-    }
-}
-
-/// Adds a body, and forgets the oldest beyond what may be kept.
-fn keep(undone: &mut Vec<Before>, before: Before) {
-    undone.push(before);
-    let bytes = |undone: &[Before]| undone.iter().map(Before::bytes).sum::<usize>();
-    while undone.len() > 1 && (undone.len() > MOST_UNDONE || bytes(undone) > MOST_UNDONE_BYTES) {
-        undone.remove(0);
-    }
-}
-
 pub struct Surgery {
     /// K, and of each node whether it is of the domain.
     domain: Vec<bool>,
@@ -388,22 +355,5 @@ mod tests {
         let edge = |at: [f32; 3]| [at, [at[0], at[1], at[2] + 20.0]];
         assert!(swept(&[edge([0.0; 3]), edge([0.0, 0.0, 3.0])]) < 1e-4);
         assert!((swept(&[edge([0.0; 3]), edge([3.0, 0.0, 0.0])]) - 60.0).abs() < 1e-3);
-    }
-
-    #[test]
-    fn bodies_before_strokes_hold_no_more_than_their_room() {
-        let before = |bytes: usize| Before {
-            snapshot: vec![0; bytes],
-            account: Account::default(),
-            hard: Vec::new(),
-        };
-        let kept = |bytes: usize, count: usize| {
-            let mut undone = Vec::new();
-            (0..count).for_each(|_| keep(&mut undone, before(bytes)));
-            undone.len()
-        };
-        assert_eq!(kept(1000, 20), MOST_UNDONE);
-        assert_eq!(kept(MOST_UNDONE_BYTES / 3, 9), 3);
-        assert_eq!(kept(MOST_UNDONE_BYTES + 1, 2), 1);
     }
 }
