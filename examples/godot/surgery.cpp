@@ -36,6 +36,10 @@ float apart(const float *a, const float *b) {
 
 // A step begins, and none is in flight: what the tool does to the body in it.
 void Tissue::operate(const upt_instrument *cutter) {
+  waits_ = waits_ && cutter != nullptr;
+  if (waits_) {
+    return;
+  }
   if (cutter == nullptr || kind != stroke_kind_) {
     end_stroke();
   }
@@ -116,6 +120,7 @@ void Tissue::end_stroke() {
 
 bool Tissue::undo() {
   wait();
+  waits_ = waits_ || in_stroke_;
   in_stroke_ = false;
   before_.clear();
   if (undone_.empty()) {

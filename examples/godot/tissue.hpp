@@ -90,6 +90,7 @@ private:
   upt_instrument last_{};
   Kind stroke_kind_ = Kind::press;
   bool in_stroke_ = false, is_cut_ = false;
+  bool waits_ = false; // until the tool is lifted: its stroke has been taken back
   std::uint32_t stroke_ = 0;
   std::int64_t changes_ = 0;
   std::size_t outside_ = 0, pressing_ = 0;
