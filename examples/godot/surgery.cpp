@@ -32,6 +32,17 @@ float apart(const float *a, const float *b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
+// Area between two places of an edge, mm2: none where it goes along itself.
+float swept(const float *poses) {
+  float p[3], q[3];
+  for (int k = 0; k < 3; k++) {
+    p[k] = poses[9 + k] - poses[k];
+    q[k] = poses[6 + k] - poses[3 + k];
+  }
+  return 0.5F * std::hypot(p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2],
+                           p[0] * q[1] - p[1] * q[0]);
+}
+
 } // namespace
 
 // A step begins, and none is in flight: what the tool does to the body in it.
@@ -70,19 +81,12 @@ void Tissue::operate(const upt_instrument *cutter) {
       return;
     }
     last_ = *cutter;
-    if (way > PUT_MM) {
+    if (way > PUT_MM || swept(poses) < STILL_MM * EDGE_MM) {
       return;
     }
     auto blade = upt::make<upt_blade>();
     blade.fracture_energy = FRACTURE_ENERGY;
-    // A blade that goes along itself sweeps nothing, which is an error of its own.
-    const upt_status status = upt_scene_cut_with(scene_.get(), &blade, stroke_, poses, 2, 2, &made);
-    if (status == UPT_ERR_ARGUMENT) {
-      return;
-    }
-    if (status < 0) {
-      throw upt::error(status, upt_last_error());
-    }
+    scene_.cut(stroke_, {poses, 12}, 2, made, blade);
   }
   std::copy(made.force, made.force + 3, reading_.force);
   if (made.is_changed != 0) {
