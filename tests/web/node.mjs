@@ -223,6 +223,12 @@ const tests = {
     const news = surgery.news();
     assert.ok(news.isNew && news.rest.length === 3 * news.vertices && news.corners.length === 3 * news.changed.length);
     assert.equal(scene.present(0, [], { surface: true }).length, 3 * news.vertices);
+    // A frame that failed took them along: they are told again, whole.
+    surgery.repeat();
+    const again = surgery.news();
+    assert.deepEqual([again.isNew, again.vertices, again.changed.length], [true, news.vertices, news.slots]);
+    assert.deepEqual(again.corners.filter((_, i) => i < 9), news.corners.filter((_, i) => i < 9));
+    assert.equal(surgery.news(), undefined);
     for (let at = 0; at < 5; at += 1) step({ ...upright, kind: "aspirator", radius: 5, position: [x, y, z + 20] });
     step();
     const less = surgery.told();

@@ -26,6 +26,7 @@ export class Surgery {
   #elements; // {corners, middles}, once they are asked for
   #hard = new Set(); // elements that were coagulated
   #changed = false; // since the host was told of the surface
+  #whole = false; // the host is told all of it
   #last; // the tool of the step before
   #stroke = 0;
   #waits = false; // until the tool is lifted: its stroke has been taken back
@@ -175,6 +176,7 @@ export class Surgery {
     this.#hard.clear();
     this.#undone = [];
     this.#stop();
+    this.#waits = false; // the clock begins anew, without the poses before
   }
 
   #stop() {
@@ -186,11 +188,22 @@ export class Surgery {
     this.#changed = this.begun;
   }
 
+  /** What was new has not arrived: the next news are of the whole surface. */
+  repeat() {
+    this.#changed = true;
+    this.#whole = true;
+  }
+
   /** What is new of the surface since it was last asked; nothing where the body is what it was. */
   news() {
     if (!this.#changed) return undefined;
     this.#changed = false;
-    const { isNew, firstVertex, rest, triangles, inside, changed } = this.#scene.updateSurface();
+    const updated = this.#scene.updateSurface();
+    const { rest, triangles, inside } = updated;
+    const isNew = updated.isNew || this.#whole;
+    const firstVertex = isNew ? 0 : updated.firstVertex;
+    const changed = isNew ? Uint32Array.from(inside.keys()) : updated.changed;
+    this.#whole = false;
     const corners = new Uint32Array(3 * changed.length);
     changed.forEach((slot, i) => corners.set(triangles.subarray(3 * slot, 3 * slot + 3), 3 * i));
     const hardened = new Set();

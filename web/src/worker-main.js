@@ -64,8 +64,15 @@ const answers = {
     clock.start(framed);
     const pressing = shown.filter((tool) => !isCutting(tool));
     const surface = surgery.news();
-    const displacement = scene.present(clock.since(framed), pressing, { surface: surgery.begun }).slice();
-    const points = attached ? scene.present(clock.since(framed), pressing, { points: true }).slice() : undefined;
+    let displacement;
+    let points;
+    try {
+      displacement = scene.present(clock.since(framed), pressing, { surface: surgery.begun }).slice();
+      points = attached ? scene.present(clock.since(framed), pressing, { points: true }).slice() : undefined;
+    } catch (error) {
+      if (surface) surgery.repeat();
+      throw error;
+    }
     const frameMs = performance.now() - begun;
     // Steps lie between poses that the library has taken: one that it refused would be in the way of those to come.
     clock.moved(framed, shown);

@@ -237,6 +237,8 @@ impl Surgery {
         self.hard.fill(false);
         self.undone.clear();
         self.stop();
+        // The clock begins anew, without the poses before.
+        self.waits = false;
     }
 
     fn stop(&mut self) {
