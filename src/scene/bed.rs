@@ -3,7 +3,7 @@
 use ::contact::{End, Sample, Spring, Tie, Vector, nearest};
 
 use super::Scene;
-use super::core::lock_read;
+use super::published::lock_read;
 use crate::contact::{MAX_TIES, TieReading, vector};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -37,7 +37,7 @@ impl Scene {
         }
         let shared = lock_read(&self.shared.published);
         if shared.cut.is_some() {
-            return Err(super::cut::refused("ties"));
+            return Err(super::body::refused("ties"));
         }
         let (rest, u) = (&self.mesh.positions, &shared.last.field);
         let position = |node| vector(rest, node) + vector(u, node);
@@ -65,7 +65,7 @@ impl Scene {
         }
         let shared = lock_read(&self.shared.published);
         if shared.cut.is_some() {
-            return Err(super::cut::refused("a bed"));
+            return Err(super::body::refused("a bed"));
         }
         let (rest, u) = (&mesh.positions, &shared.last.field);
         let position = |node| vector(rest, node) + vector(u, node);

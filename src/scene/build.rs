@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
-use super::core::{self, Core, CoreParts};
+use super::body::SceneBody;
+use super::core::Core;
 use super::corrected::Corrector;
 use super::engine::Engine;
+use super::maker::{Parts, StepMaker};
+use super::published::SCENE;
 use super::{reduced, upt};
 use crate::bundle::{Mesh, TensorFile};
 use crate::envelope::EnvelopeCheck;
@@ -62,7 +65,7 @@ pub(super) fn build(
                 .as_ref()
                 .ok_or_else(|| Error::bundle("bundle.json", "field `prior` is missing"))?;
             let engine = reduced::ReducedEngine::new(model, kind, table)?;
-            Engine::Reduced(memory::boxed(engine, core::SCENE)?)
+            Engine::Reduced(memory::boxed(engine, SCENE)?)
         }
         KindModel::Upt(kind) => {
             let make = || {
@@ -82,13 +85,15 @@ pub(super) fn build(
                 };
                 parts.engine(options)
             };
-            Engine::Upt(Proven::new(make, core::SCENE)?)
+            Engine::Upt(Proven::new(make, SCENE)?)
         }
     };
     let corrected = Corrector::new(model, options, isa, &pool)?;
-    Core::new(CoreParts {
-        model: Arc::clone(model),
-        mesh: own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh)),
+    let corrected = corrected.map(|own| memory::boxed(own, SCENE)).transpose()?;
+    let mesh = own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh));
+    let of_scene = corrected.as_ref().map(|own| own.time_step.integrator);
+    StepMaker::new(Parts {
+        body: SceneBody::new(Arc::clone(model), mesh, of_scene)?,
         options: options.clone(),
         isa,
         pool,
@@ -96,4 +101,5 @@ pub(super) fn build(
         corrected,
         envelope,
     })
+    .map(Core::new)
 }

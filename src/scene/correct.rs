@@ -1,22 +1,19 @@
 //! Corrections inside a step: after the prediction, before the guard.
 
 use crate::clock::Instant;
-use std::sync::{Arc, RwLock};
+use std::sync::RwLock;
 
-use super::core::{Core, lock_read};
+use super::corrected::Corrector;
 use super::engine::Engine;
+use super::maker::StepMaker;
 use super::published::Published;
+use super::published::lock_read;
 use super::timing::Stopwatch;
-use crate::corrections::{Enough, History, Input, Integrator, SolverContext};
+use crate::corrections::{Enough, Input};
 use crate::error::Result;
 use crate::stats::SceneStats;
 
-/// After tools let go, the elements make the steps while the last state is displaced by more than this, mm. The displacement at which the
-/// model's own free motion ends is added, or a network that rests farther out would never take over. The elements know
-/// what the tools did; the learned part would go on from a field that it did not predict.
-const SWUNG_MM: f32 = 0.1;
-
-impl Core {
+impl StepMaker {
     /// Corrects `next` while there is contact; otherwise lets the velocities follow it.
     pub(super) fn correct(
         &mut self,
@@ -29,33 +26,34 @@ impl Core {
         let Some(corrected) = &mut self.corrected else {
             return Ok(());
         };
-        let (Some(prior), corrections) = (&self.model.prior, self.model.corrections()?) else {
+        let (enough, alone) = (corrected.enough(start), corrected.alone());
+        let Corrector {
+            solver,
+            parts,
+            time_step,
+            own_pace,
+            ..
+        } = &mut **corrected;
+        let context = self.loads.context(&self.body, &self.machine, time_step)?;
+        let Some(context) = context else {
             return Ok(());
         };
         let mut watch = Stopwatch::start();
         let _span = tracing::trace_span!("corrections").entered();
-        let time_step = Arc::clone(&corrected.time_step);
-        let context = SolverContext {
-            isa: self.machine.isa,
-            pool: &self.machine.pool,
-            prior,
-            corrections,
-            time_step: &time_step,
-            held: Core::held_of(&self.loads, corrections),
-        };
-        let touched = !self.incoming.is_empty();
+        let states = &mut self.states;
+        let touched = !states.incoming.is_empty();
         // The learned part takes over some steps after a release; with a length of step of the scene's own it never does.
-        self.next_corrected = touched || (!learns && !corrected.alone()) || self.loaded;
-        let load = self.loads.as_ref().and_then(|loads| loads.load());
+        states.next_corrected = touched || (!learns && !alone) || self.loads.loaded;
+        let load = self.loads.load();
         // A length of step of the scene's own may be short enough to need no substeps. Under a load that acts everywhere iterations are worth more.
-        let in_parts = (corrected.free_substeps > 1 || !corrected.own_pace) && load.is_none();
+        let in_parts = (parts.free_substeps > 1 || !*own_pace) && load.is_none();
         if !touched && !learns && in_parts {
-            corrected.be_shorter(context, &self.model)?;
+            parts.be_shorter(context, &self.body.model)?;
         }
         let shared = lock_read(published);
         let input = Input {
-            rest: &self.mesh.positions,
-            contact: &self.incoming,
+            rest: &self.body.mesh.positions,
+            contact: &states.incoming,
             last: given.unwrap_or(&shared.last.field),
             before: given.unwrap_or(&shared.before.field),
             still: given.is_some(),
@@ -64,59 +62,29 @@ impl Core {
             enough: match load {
                 // What the whole body does settles later than an iteration's own step says.
                 // Whole modes know what it does.
-                Some(_) if !corrections.has_whole_modes() => Enough {
+                Some(_) if !context.corrections.has_whole_modes() => Enough {
                     error_mm: 0.0,
-                    ..corrected.enough(start)
+                    ..enough
                 },
-                _ => corrected.enough(start),
+                _ => enough,
             },
         };
-        if touched {
-            let report = corrected
-                .solver
-                .correct(context, &input, &mut self.next.field)?;
-            corrected.report_to(&report, stats);
+        let next = &mut states.next.field;
+        let report = if touched {
+            Some(solver.correct(context, &input, next)?)
         } else if !learns {
-            let substepper = corrected.substepper.as_deref_mut().filter(|_| in_parts);
-            let next = &mut self.next.field;
-            let report = corrected.solver.swing(context, &input, substepper, next)?;
-            corrected.report_to(&report, stats);
+            let substepper = parts.substepper.as_deref_mut().filter(|_| in_parts);
+            Some(solver.swing(context, &input, substepper, next)?)
         } else {
-            corrected.solver.follow(context, &input, &self.next.field)?;
+            solver.follow(context, &input, next)?;
+            None
+        };
+        if let Some(report) = report {
+            corrected.report_to(&report, stats);
         }
         drop(shared);
         stats.corrections_ms = watch.lap();
         Ok(())
-    }
-
-    /// Whether the learned part (or, in a bundle without one, its free vibration) makes a step without contact; decided by the last state.
-    pub(super) fn learns(&self) -> bool {
-        let Some(corrected) = &self.corrected else {
-            return true;
-        };
-        let lifted = corrected.most_substeps > 1 && self.driven && self.is_swung();
-        !(corrected.alone() || lifted || self.loaded)
-    }
-
-    /// Whether the last state is displaced by more than where the model's own free motion ends.
-    pub(super) fn is_swung(&self) -> bool {
-        self.counters.max_displacement > SWUNG_MM + self.model.manifest.rest_displacement_mm
-    }
-
-    /// The length of a step and the damping.
-    pub(super) fn integrator(&self) -> Integrator {
-        let manifest = &self.model.manifest;
-        let of_bundle = Integrator {
-            step_s: manifest.dt_s,
-            damping_per_s: manifest.material.damping_per_s,
-        };
-        let corrected = self.corrected.as_ref();
-        corrected.map_or(of_bundle, |own| own.time_step.integrator)
-    }
-
-    /// The length of a step, s.
-    pub(super) fn step_s(&self) -> f64 {
-        self.integrator().step_s
     }
 
     /// The reaction of the last published state; false where it was not corrected.
@@ -124,19 +92,18 @@ impl Core {
         let Some(corrected) = &self.corrected else {
             return false;
         };
-        if let Some(problem) = &self.problem
-            && !problem.past.forces.is_empty()
-        {
-            return self.loads_at_contacts(problem, out);
+        if self.tools.pushes() {
+            self.tools.loads_at_contacts(&self.states, out);
+            return true;
         }
         // A state that fell back has inverted elements, and what they push with means nothing.
         let motion = &corrected.solver.motion;
         let sound = motion.min_det >= crate::corrections::SMALLEST_DET
             && motion.reaction.len() == out.len();
-        if self.contact.is_empty() || !sound {
+        if self.states.contact.is_empty() || !sound {
             return false;
         }
-        corrected.solver.reaction(&self.contact, out);
+        corrected.solver.reaction(&self.states.contact, out);
         true
     }
 
@@ -151,45 +118,23 @@ impl Core {
             Engine::Upt(_) => return Ok(()),
         };
         let compute = self.machine.compute();
-        if self.counters.was_corrected[0] {
+        let [last_corrected, before_corrected] = self.states.counters.was_corrected;
+        if last_corrected {
             engine.swing_from(
                 compute,
                 &corrected.basis_starts,
                 [&shared.last.field, &shared.before.field],
                 &corrected.solver.motion.velocity,
-                self.model.manifest.dt_s as f32,
+                self.body.model.manifest.dt_s as f32,
             )?;
         }
         engine.adopt_fields(
             compute,
             &corrected.basis_starts,
             [
-                self.counters.was_corrected[0].then_some(shared.last.field.as_slice()),
-                self.counters.was_corrected[1].then_some(shared.before.field.as_slice()),
+                last_corrected.then_some(shared.last.field.as_slice()),
+                before_corrected.then_some(shared.before.field.as_slice()),
             ],
         )
-    }
-
-    /// Takes what corrections remembered in another state.
-    pub(super) fn put_history(&mut self, history: Option<History>) -> Result<()> {
-        let (Some(corrected), Some(history), Some(prior)) =
-            (&mut self.corrected, history, &self.model.prior)
-        else {
-            return Ok(());
-        };
-        let context = SolverContext {
-            isa: self.machine.isa,
-            pool: &self.machine.pool,
-            prior,
-            corrections: self.model.corrections()?,
-            time_step: &corrected.time_step,
-            held: Core::held_of(&self.loads, self.model.corrections()?),
-        };
-        corrected.solver.restore(context, &history)
-    }
-
-    /// Whether every node is decoded in each step, and kept.
-    pub(super) fn keeps_all_nodes(&self) -> bool {
-        self.corrected.is_some() || self.engine.keeps_all_nodes()
     }
 }

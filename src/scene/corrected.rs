@@ -19,18 +19,10 @@ const WHAT: &str = "the corrections of a scene";
 #[derive(HeldBytes)]
 pub struct Corrector {
     pub solver: Box<ImplicitSolver>,
-    /// Substeps of steps that tools drive; made at their first contact, where the options allow any.
-    pub substeps: Option<Box<Substeps>>,
-    pub(super) most_substeps: u32,
-    /// Substeps of a step without contact; 1 for a whole one.
-    pub(super) free_substeps: u32,
-    /// The solver of steps in parts, made at the first step that needs it.
-    pub substepper: Option<Box<Substepper>>,
-    most: u32,
-    target_mm: f32,
-    budget_us: u32,
-    error_limit_mm: f32,
-    calibration: f32,
+    /// Steps in parts.
+    pub(super) parts: StepParts,
+    #[held(skip)]
+    goal: Goal,
     pub(super) basis_starts: Vec<usize>,
     /// The length of the scene's steps, and the damping.
     #[held(skip)]
@@ -39,6 +31,72 @@ pub struct Corrector {
     pub(super) own_pace: bool,
     /// The tissue relaxes, which no learned map knows.
     pub(super) relaxes: bool,
+}
+
+/// When a step has been corrected enough, and how its error is told.
+#[derive(Clone, Copy, Debug)]
+struct Goal {
+    /// Iterations at most.
+    most: u32,
+    /// 0: none.
+    target_mm: f32,
+    /// 0: none.
+    budget_us: u32,
+    /// Above it a step raises [`flag::ERROR`]; 0: none.
+    error_limit_mm: f32,
+    /// The true error over the estimate, as the bundle was measured.
+    calibration: f32,
+}
+
+impl Goal {
+    /// The estimate that reaches the target, mm.
+    fn estimate_mm(&self) -> f32 {
+        self.target_mm / self.calibration
+    }
+}
+
+/// Steps in parts: how many there may be, and what makes them, from the first step that needs it.
+#[derive(HeldBytes)]
+pub struct StepParts {
+    /// Substeps of steps that tools drive; made at their first contact, where the options allow any.
+    pub substeps: Option<Box<Substeps>>,
+    pub(super) most_substeps: u32,
+    /// Substeps of a step without contact; 1 for a whole one.
+    pub(super) free_substeps: u32,
+    /// The solver of steps in parts, made at the first step that needs it.
+    pub substepper: Option<Box<Substepper>>,
+    /// An estimate above it asks for substeps, mm.
+    limit_mm: f32,
+}
+
+impl StepParts {
+    /// Makes what substeps need, where the steps may have any.
+    pub(super) fn be_ready(&mut self, context: SolverContext<'_>, model: &Model) -> Result<()> {
+        if self.most_substeps < 2 || self.substeps.is_some() {
+            return Ok(());
+        }
+        self.be_shorter(context, model)?;
+        self.substeps = Some(memory::boxed(Substeps::new(self.limit_mm)?, WHAT)?);
+        Ok(())
+    }
+
+    /// Makes the solver of substeps. There is one length for steps under tools and for free ones, so one solver serves both.
+    pub(super) fn be_shorter(&mut self, context: SolverContext<'_>, model: &Model) -> Result<()> {
+        let count = self.most_substeps.max(self.free_substeps);
+        if count < 2 || self.substepper.is_some() {
+            return Ok(());
+        }
+        let whole = context.time_step.integrator;
+        let integrator = whole.over(whole.step_s / f64::from(count));
+        let time_step = (context.corrections).time_step(
+            &model.mesh,
+            &model.manifest.step_material(),
+            integrator,
+        )?;
+        let substepper = Substepper::new(context, Arc::new(time_step), count)?;
+        self.substepper = Some(memory::boxed(substepper, WHAT)?);
+        Ok(())
+    }
 }
 
 impl Corrector {
@@ -144,18 +202,24 @@ impl Corrector {
             held: &corrections.body.held,
         };
         let relaxes = model.manifest.relaxes();
-        Ok(Some(Corrector {
-            solver: memory::boxed(ImplicitSolver::new(context)?, WHAT)?,
-            substeps: None,
-            most_substeps,
-            free_substeps: own.free_substeps(integrator.step_s, relaxes),
-            relaxes,
-            substepper: None,
+        let goal = Goal {
             most,
             target_mm,
             budget_us,
             error_limit_mm: options.error_limit_mm,
             calibration: entry.map_or(1.0, |entry| entry.calibration),
+        };
+        Ok(Some(Corrector {
+            solver: memory::boxed(ImplicitSolver::new(context)?, WHAT)?,
+            parts: StepParts {
+                substeps: None,
+                most_substeps,
+                free_substeps: own.free_substeps(integrator.step_s, relaxes),
+                substepper: None,
+                limit_mm: goal.estimate_mm(),
+            },
+            goal,
+            relaxes,
             basis_starts: prior.basis_starts()?,
             own_pace: own.is_some(),
             time_step,
@@ -177,11 +241,12 @@ fn none(own: OwnPace, substeps: u32) -> Result<Option<Corrector>> {
 impl Corrector {
     /// When a step that began at `start` has been corrected enough.
     pub(super) fn enough(&self, start: Instant) -> Enough {
+        let budget_us = self.goal.budget_us;
         Enough {
-            iterations: self.most,
-            error_mm: self.target_mm / self.calibration,
-            until: (self.budget_us > 0)
-                .then(|| start + std::time::Duration::from_micros(self.budget_us.into())),
+            iterations: self.goal.most,
+            error_mm: self.goal.estimate_mm(),
+            until: (budget_us > 0)
+                .then(|| start + std::time::Duration::from_micros(budget_us.into())),
         }
     }
 
@@ -190,38 +255,10 @@ impl Corrector {
         self.own_pace || self.relaxes
     }
 
-    /// Corrections that a step may get.
-    pub(super) fn most(&self) -> u32 {
-        self.most
-    }
-
-    /// Makes what substeps need, where the steps may have any.
-    pub(super) fn be_ready(&mut self, context: SolverContext<'_>, model: &Model) -> Result<()> {
-        if self.most_substeps < 2 || self.substeps.is_some() {
-            return Ok(());
-        }
-        self.be_shorter(context, model)?;
-        let limit_mm = self.target_mm / self.calibration;
-        self.substeps = Some(memory::boxed(Substeps::new(limit_mm)?, WHAT)?);
-        Ok(())
-    }
-
-    /// Makes the solver of substeps. There is one length for steps under tools and for free ones, so one solver serves both.
-    pub(super) fn be_shorter(&mut self, context: SolverContext<'_>, model: &Model) -> Result<()> {
-        let count = self.most_substeps.max(self.free_substeps);
-        if count < 2 || self.substepper.is_some() {
-            return Ok(());
-        }
-        let whole = self.time_step.integrator;
-        let integrator = whole.over(whole.step_s / f64::from(count));
-        let time_step = (context.corrections).time_step(
-            &model.mesh,
-            &model.manifest.step_material(),
-            integrator,
-        )?;
-        let substepper = Substepper::new(context, Arc::new(time_step), count)?;
-        self.substepper = Some(memory::boxed(substepper, WHAT)?);
-        Ok(())
+    /// Whether the steps get as many corrections as the bundle's limits for tools were measured with.
+    pub(super) fn covers_tools(&self, model: &Model) -> bool {
+        let limits = model.manifest.envelope.tools;
+        limits.is_some_and(|tools| self.goal.most >= tools.corrections)
     }
 
     /// Bytes held. The time step counts only where the scene has its own: else it is the model's.
@@ -240,11 +277,11 @@ impl Corrector {
         stats.substeps = report.substeps;
         stats.residual = report.residual;
         stats.min_det = report.min_det;
-        stats.error_mm = report.error_mm * self.calibration;
+        stats.error_mm = report.error_mm * self.goal.calibration;
         if report.fell_back {
             stats.flags |= flag::FELL_BACK;
         }
-        let limit = self.error_limit_mm;
+        let limit = self.goal.error_limit_mm;
         if limit > 0.0 && (stats.error_mm > limit || stats.error_mm.is_nan()) {
             stats.flags |= flag::ERROR;
         }

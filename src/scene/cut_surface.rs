@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use super::Scene;
-use super::core::{Core, lock_read};
 use super::followed_surface::{self, Followed};
+use super::maker::StepMaker;
 use super::points::AttachedPoints;
+use super::published::lock_read;
 use super::published::{BodyNumber, Published};
 use super::shared::lock;
 use crate::error::{Error, Result};
@@ -73,7 +74,7 @@ impl Scene {
                     own.changed.clear();
                     (own.rest.len(), false)
                 }
-                _ => core.follow(&mut held, body)?,
+                _ => follow(&core.maker, &mut held, body)?,
             };
             let own = held.as_ref();
             let [vertices, triangles, changed] = own.map_or([0; 3], |own| {
@@ -181,33 +182,36 @@ impl Followed {
     }
 }
 
-impl Core {
-    /// Makes or updates the surface. Returns the first new vertex, and whether all are new.
-    fn follow(&self, held: &mut Option<Followed>, body: BodyNumber) -> Result<(usize, bool)> {
-        memory::probe(self.most_surface_bytes(), followed_surface::WHAT)?;
-        let whole;
-        let now = match &self.cut {
-            Some(cut) => &cut.body,
-            None => {
-                whole = self.whole_body()?;
-                if self.corrected.is_some() {
-                    let material = &self.model.manifest.step_material();
-                    (self.model.corrections()?).prepare_cut(&self.mesh, material)?;
-                }
-                &whole
+/// Makes or updates the surface. Returns the first new vertex, and whether all are new.
+fn follow(
+    maker: &StepMaker,
+    held: &mut Option<Followed>,
+    body: BodyNumber,
+) -> Result<(usize, bool)> {
+    let own_body = &maker.body;
+    memory::probe(own_body.most_surface_bytes(), followed_surface::WHAT)?;
+    let whole;
+    let now = match &own_body.cut {
+        Some(cut) => &cut.body,
+        None => {
+            whole = own_body.whole_body()?;
+            if maker.corrected.is_some() {
+                let material = &own_body.model.manifest.step_material();
+                (own_body.model.corrections()?).prepare_cut(&own_body.mesh, material)?;
             }
-        };
-        if held.as_ref().is_some_and(|own| own.body.line != body.line) {
-            *held = None;
+            &whole
         }
-        let own = match held {
-            Some(own) => own,
-            None => held.insert(Followed::new(now.mesh())?),
-        };
-        let found = own.follow(now, &self.mesh)?;
-        own.body = body;
-        Ok(found)
+    };
+    if held.as_ref().is_some_and(|own| own.body.line != body.line) {
+        *held = None;
     }
+    let own = match held {
+        Some(own) => own,
+        None => held.insert(Followed::new(now.mesh())?),
+    };
+    let found = own.follow(now, &own_body.mesh)?;
+    own.body = body;
+    Ok(found)
 }
 
 fn not_asked() -> Error {

@@ -157,7 +157,7 @@ impl Scene {
         let _frames = self.hold_frames(true)?;
         let line = |recorder: &mut Recorder| recorder.open(&Line::DropFragments {});
         self.told(line, |core, published| {
-            let Some(cut) = &core.cut else {
+            let Some(cut) = &core.maker.body.cut else {
                 return Ok(Vec::new());
             };
             let held = &cut.intact.mesh.held_nodes;

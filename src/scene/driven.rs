@@ -2,79 +2,22 @@
 //! the linear response.
 
 use crate::clock::Instant;
-use std::sync::{Arc, RwLock};
+use std::sync::RwLock;
 
-use super::core::{Core, lock_read, lock_write};
 use super::corrected::Corrector;
+use super::maker::StepMaker;
 use super::published::Published;
+use super::published::lock_read;
 use super::timing::Stopwatch;
-use super::{Contact, StepInput};
-use crate::contact::{Compliance, ContactProblem, State, Tool};
-use crate::corrections::{Input, SolverContext};
-use crate::error::{Error, Result};
-use crate::features::Proven;
-use crate::stats::{SceneStats, flag};
+use crate::contact::{Compliance, State};
+use crate::corrections::Input;
+use crate::error::Result;
+use crate::stats::SceneStats;
 
-const WHAT: &str = "the contact of instruments";
 /// Free tissue may come this deep into a tool before the step is made with contact, mm.
 const INTRUSION_MM: f32 = 0.02;
-/// Tissue this deep inside of a tool raises [`flag::DEEP`], mm.
-const DEEP_MM: f32 = 1.0;
-/// A contact solve that leaves more than this raises [`flag::UNSOLVED`], mm.
-const UNSOLVED_MM: f32 = 0.01;
 
-impl Core {
-    /// Takes the tools and ties of a step; says whether one is near enough to touch the tissue, or there are ties.
-    pub(super) fn update_tools(
-        &mut self,
-        published: &RwLock<Published>,
-        input: &StepInput<'_>,
-    ) -> Result<bool> {
-        let _span = tracing::trace_span!("search").entered();
-        self.driven = match input.contact {
-            Contact::Tools(_) => true,
-            Contact::None => self.counters.driven,
-            Contact::Dense(_) | Contact::Sparse { .. } => false,
-        };
-        let ties = input.loads.ties;
-        let tools: &[Tool] = match input.contact {
-            Contact::Tools(tools) => tools,
-            // The elements make each step of a cut body, and of one with ties, as if tools were there.
-            Contact::None if self.cut.is_some() || !ties.is_empty() => &[],
-            _ => {
-                if let Some(problem) = &mut self.problem {
-                    problem.forget_tools();
-                }
-                return Ok(false);
-            }
-        };
-        self.check_ties(ties)?;
-        if self.model.prior.is_none() {
-            return Err(Error::Unsupported(
-                "instruments: the bundle has no linear response to solve their contact with; pass the nodes that upt_scene_contacts_from_instruments finds".into(),
-            ));
-        }
-        let mut problem = match self.problem.take() {
-            Some(problem) => problem,
-            None => {
-                let make = || ContactProblem::new(self.model.samples()?, Arc::clone(&self.mesh));
-                Proven::new(make, WHAT)?
-            }
-        };
-        let placed = self.place_ties(input, tools.len());
-        let shared = lock_read(published);
-        let (rest, start) = (&self.mesh.positions, &shared.last.field);
-        let begun = placed.and_then(|()| problem.begin(tools, &self.placed_ties, rest, start));
-        let state = State {
-            rest,
-            u: start,
-            start,
-        };
-        let near = begun.and_then(|()| problem.is_near(state));
-        self.problem = Some(problem);
-        near
-    }
-
+impl StepMaker {
     /// Makes `next` where tools drive the step; false where it is free.
     pub(super) fn drive(
         &mut self,
@@ -83,39 +26,27 @@ impl Core {
         start: Instant,
         stats: &mut SceneStats,
     ) -> Result<bool> {
-        self.next_corrected = false;
-        let Some(mut problem) = self.problem.take() else {
+        self.states.next_corrected = false;
+        let Some(problem) = &self.tools.problem else {
             return Ok(false);
         };
-        let is_prescribed = !self.incoming.is_empty();
-        let is_free = is_prescribed || (problem.tools().is_empty() && !near && self.cut.is_none());
-        let result = match is_free {
-            true => Ok(false),
-            false if self.corrected.is_some() => {
-                self.drive_corrected(published, &mut problem, near, start, stats)
-            }
-            false => self.drive_linear(published, &mut problem, near, stats),
-        };
-        self.problem = Some(problem);
-        result
-    }
-
-    fn drive_corrected(
-        &mut self,
-        published: &RwLock<Published>,
-        problem: &mut ContactProblem,
-        near: bool,
-        start: Instant,
-        stats: &mut SceneStats,
-    ) -> Result<bool> {
-        if self.cut.is_some() || problem.has_ties() {
-            self.load(published, problem, start, stats)?;
+        let is_prescribed = !self.states.incoming.is_empty();
+        let is_cut = self.body.cut.is_some();
+        if is_prescribed || (problem.tools().is_empty() && !near && !is_cut) {
+            return Ok(false);
+        }
+        if self.corrected.is_none() {
+            return self.drive_linear(published, near, stats);
+        }
+        if is_cut || problem.has_ties() {
+            self.load(published, start, stats)?;
             return Ok(true);
         }
         if near && (problem.had_forces() || problem.has_grasp()) {
             let before = *stats;
-            self.load(published, problem, start, stats)?;
-            if problem.has_forces() {
+            self.load(published, start, stats)?;
+            let tools = &self.tools.problem;
+            if tools.as_ref().is_some_and(|problem| problem.has_forces()) {
                 return Ok(true);
             }
             // No tool pushes in that state: drop it together with its statistics.
@@ -127,16 +58,18 @@ impl Core {
         let is_penetrated = {
             let shared = lock_read(published);
             let state = State {
-                rest: &self.mesh.positions,
-                u: &self.next.field,
+                rest: &self.body.mesh.positions,
+                u: &self.states.next.field,
                 start: &shared.last.field,
             };
-            problem.is_penetrated(state, INTRUSION_MM)
+            let tools = &mut self.tools.problem;
+            tools
+                .as_mut()
+                .is_some_and(|problem| problem.is_penetrated(state, INTRUSION_MM))
         };
-        if is_penetrated {
-            self.load(published, problem, start, stats)?;
-        } else {
-            self.finish_tools(published, problem, stats);
+        match is_penetrated {
+            true => self.load(published, start, stats)?,
+            false => self.finish_tools(published, stats),
         }
         Ok(true)
     }
@@ -145,78 +78,58 @@ impl Core {
     fn load(
         &mut self,
         published: &RwLock<Published>,
-        problem: &mut ContactProblem,
         start: Instant,
         stats: &mut SceneStats,
     ) -> Result<()> {
-        let (Some(corrected), Some(prior)) = (&mut self.corrected, &self.model.prior) else {
+        let (Some(corrected), Some(problem)) = (&mut self.corrected, &mut self.tools.problem)
+        else {
+            return Ok(());
+        };
+        let enough = corrected.enough(start);
+        let Corrector {
+            solver,
+            parts,
+            time_step,
+            ..
+        } = &mut **corrected;
+        let context = self.loads.context(&self.body, &self.machine, time_step)?;
+        let Some(context) = context else {
             return Ok(());
         };
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("corrections").entered();
-        let time_step = Arc::clone(&corrected.time_step);
-        let context = SolverContext {
-            isa: self.machine.isa,
-            pool: &self.machine.pool,
-            prior,
-            corrections: self.model.corrections()?,
-            time_step: &time_step,
-            held: Core::held_of(&self.loads, self.model.corrections()?),
-        };
-        corrected.be_ready(context, &self.model)?;
+        parts.be_ready(context, &self.body.model)?;
         let shared = lock_read(published);
-        let rest = &self.mesh.positions;
+        let states = &mut self.states;
         let input = Input {
-            rest,
-            contact: &self.incoming,
+            rest: &self.body.mesh.positions,
+            contact: &states.incoming,
             last: &shared.last.field,
             before: &shared.before.field,
             still: false,
-            load: self.loads.as_ref().and_then(|loads| loads.load()),
+            load: self.loads.load(),
             way: [0.0, 1.0],
-            enough: corrected.enough(start),
+            enough,
         };
-        let next = &mut self.next.field;
-        let Corrector {
-            solver,
-            substeps,
-            substepper,
-            ..
-        } = corrected;
         // A support group ends where it is led in one step.
-        let leads = self
-            .loads
-            .as_ref()
-            .is_some_and(|loads| loads.held.is_some());
-        let parts = (substeps.as_deref_mut().zip(substepper.as_deref_mut())).filter(|_| !leads);
-        let report = solver.drive(context, &input, problem, parts, next)?;
+        let parts = (parts.substeps.as_deref_mut()).zip(parts.substepper.as_deref_mut());
+        let parts = parts.filter(|_| !self.loads.leads());
+        let report = solver.drive(context, &input, problem, parts, &mut states.next.field)?;
         corrected.report_to(&report, stats);
         drop(shared);
         drop(span);
-        self.next_corrected = true;
-        Self::report_depth(problem, stats);
+        states.next_corrected = true;
         // The same contact as a collision field would give it: the envelope check, the engine's record and the host's list of
         // contacts read it there.
-        self.incoming
-            .take_nodes(problem.touched(&self.held), &self.next.field);
+        let touched = problem.touched(&self.body.held);
+        states.incoming.take_nodes(touched, &states.next.field);
         let made_of = report.substeps.max(1) as f32;
-        self.used = self
-            .covers_tools()
-            .then(|| problem.used(self.step_s() as f32 / made_of));
+        let step_s = self.body.step_s() as f32 / made_of;
+        let covered = corrected.covers_tools(&self.body.model);
+        self.tools.used = covered.then(|| problem.used(step_s));
+        self.tools.report_depth(stats);
         stats.corrections_ms = watch.lap();
         self.predict_and_decode(published, None, false, stats)
-    }
-
-    /// Whether the steps get as many corrections as the bundle's limits for tools were measured with.
-    fn covers_tools(&self) -> bool {
-        let needed = self
-            .model
-            .manifest
-            .envelope
-            .tools
-            .map(|tools| tools.corrections);
-        let corrected = self.corrected.as_ref();
-        needed.is_some_and(|needed| corrected.is_some_and(|solver| solver.most() >= needed))
     }
 
     /// Contact once on the linear response, as a collision field for the model.
@@ -225,102 +138,41 @@ impl Core {
     fn drive_linear(
         &mut self,
         published: &RwLock<Published>,
-        problem: &mut ContactProblem,
         near: bool,
         stats: &mut SceneStats,
     ) -> Result<bool> {
-        let Some(prior) = &self.model.prior else {
+        let (Some(prior), Some(problem)) = (&self.body.model.prior, &mut self.tools.problem) else {
             return Ok(false);
         };
         if near {
             let mut watch = Stopwatch::start();
-            let compliance = Compliance::at_rest(prior, &self.held, None);
+            let compliance = Compliance::at_rest(prior, &self.body.held, None);
             let shared = lock_read(published);
             let state = State {
-                rest: &self.mesh.positions,
+                rest: &self.body.mesh.positions,
                 u: &shared.last.field,
                 start: &shared.last.field,
             };
             let (nodes, vectors) = problem.prescribe(compliance, state)?;
-            let count = self.mesh.node_count();
-            self.incoming.take_sparse(nodes, vectors, count)?;
+            let count = self.body.mesh.node_count();
+            self.states.incoming.take_sparse(nodes, vectors, count)?;
             stats.check_ms += watch.lap();
         }
         self.predict_and_decode(published, None, true, stats)?;
-        self.finish_tools(published, problem, stats);
+        self.finish_tools(published, stats);
         Ok(true)
     }
 
-    fn finish_tools(
-        &mut self,
-        published: &RwLock<Published>,
-        problem: &mut ContactProblem,
-        stats: &mut SceneStats,
-    ) {
+    fn finish_tools(&mut self, published: &RwLock<Published>, stats: &mut SceneStats) {
         let shared = lock_read(published);
-        problem.finish(State {
-            rest: &self.mesh.positions,
-            u: &self.next.field,
-            start: &shared.last.field,
-        });
-        Self::report_depth(problem, stats);
+        let fields = (&*self.states.next.field, &*shared.last.field);
+        self.tools.finish(&self.body, fields, stats);
     }
 
     /// Clears the tools' forces after the guard replaced the state that they made. Nothing pushes the new state, and it may lie inside a
     /// tool: the depth is measured again.
     pub(super) fn release_tools(&mut self, published: &RwLock<Published>, stats: &mut SceneStats) {
-        if let Some(mut problem) = self.problem.take() {
-            problem.clear_forces();
-            self.finish_tools(published, &mut problem, stats);
-            self.problem = Some(problem);
-        }
-    }
-
-    fn report_depth(problem: &ContactProblem, stats: &mut SceneStats) {
-        stats.contact_ms = problem.spent_ms();
-        let readings = problem.next.tools.iter().map(|held| held.reading);
-        if readings
-            .clone()
-            .any(|reading| reading.residual_mm > UNSOLVED_MM)
-        {
-            stats.flags |= flag::UNSOLVED;
-        }
-        let deepest = readings.map(|r| r.penetration_mm).fold(0.0, f32::max);
-        if deepest > DEEP_MM || problem.lay_in_tissue {
-            stats.flags |= flag::DEEP;
-        }
-    }
-
-    /// Publishes the tools of a step in which the scene sleeps: their poses are remembered, and none touches the tissue.
-    pub(super) fn commit_untouched_tools(&mut self, published: &RwLock<Published>) {
-        if let Some(problem) = &mut self.problem {
-            problem.clear_forces();
-            problem.commit();
-        }
-        self.publish_tools(&mut lock_write(published));
-    }
-
-    /// The tools' readings and forces become readable.
-    pub(super) fn publish_tools(&self, shared: &mut Published) {
-        match &self.problem {
-            Some(problem) => {
-                problem.report(&mut shared.tools, &self.mesh.positions, &shared.last.field)
-            }
-            None => shared.tools.clear(),
-        }
-    }
-
-    /// The tools' loads at the contact nodes, in the host's order: what the tissue does to them, mN.
-    pub(super) fn loads_at_contacts(&self, problem: &ContactProblem, out: &mut [f32]) -> bool {
-        out.fill(0.0);
-        problem.each_push(|node, force| {
-            if let Ok(at) = self.contact.nodes.binary_search(&node) {
-                let at = 3 * self.contact.order[at] as usize;
-                for (sum, force) in out[at..at + 3].iter_mut().zip(force.to_array()) {
-                    *sum -= force;
-                }
-            }
-        });
-        true
+        self.tools.clear_forces();
+        self.finish_tools(published, stats);
     }
 }

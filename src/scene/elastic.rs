@@ -2,8 +2,9 @@
 
 use std::sync::RwLock;
 
-use super::core::{Core, lock_read};
+use super::core::Core;
 use super::published::Published;
+use super::published::lock_read;
 use crate::bundle::Mesh;
 use crate::error::Result;
 use crate::forces::ReactionForces;

@@ -3,11 +3,12 @@
 use std::sync::RwLock;
 
 use super::Scene;
-use super::core::{Core, lock_read};
+use super::core::Core;
+use super::hands::stepped;
 use super::published::Published;
+use super::published::lock_read;
 use crate::error::{Error, Result};
-use crate::features::HAS_INSTRUMENTS;
-use crate::haptics::publish::{Stepped, join};
+use crate::haptics::publish::join;
 use crate::haptics::{HapticOptions, Haptics};
 use crate::memory;
 
@@ -52,66 +53,31 @@ impl Core {
         published: &RwLock<Published>,
         options: &HapticOptions,
     ) -> Result<Haptics> {
-        let (Some(prior), Some(_)) = (&self.model.prior, &self.corrected) else {
+        let Core { maker, hands } = self;
+        let model = &maker.body.model;
+        let (Some(prior), Some(_)) = (&model.prior, &maker.corrected) else {
             return Err(Error::Unsupported(
                 "haptics: the bundle has no linear response, or the scene makes no corrections; use a bundle with both, and leave `corrections` on".into(),
             ));
         };
-        self.hands.retain(|hand| !hand.is_over());
-        if self.hands.len() >= MOST_HANDS {
+        hands.forget_gone();
+        if hands.links.len() >= MOST_HANDS {
             return Err(Error::Argument(format!(
                 "the scene already has {MOST_HANDS} haptics objects; destroy one first"
             )));
         }
-        memory::reserve(&mut self.hands, 1, "the haptics of a scene")?;
-        let samples = self.model.samples()?;
-        let corrections = self.model.corrections()?;
-        let (mut link, haptics) = join(options, prior, corrections, self.integrator(), samples)?;
-        self.took_s = 0.0;
+        memory::reserve(&mut hands.links, 1, "the haptics of a scene")?;
+        let samples = model.samples()?;
+        let corrections = model.corrections()?;
+        let integrator = maker.body.integrator;
+        let (mut link, haptics) = join(options, prior, corrections, integrator, samples)?;
+        hands.took_s = 0.0;
         let shared = lock_read(published);
-        if let Some(step) = self.stepped(&shared) {
+        if let Some(step) = stepped(maker, &shared, hands.took_s) {
             link.publish(&step)?;
         }
         drop(shared);
-        self.hands.push(link);
+        hands.links.push(link);
         Ok(haptics)
-    }
-
-    /// The last state, as hands are told of it.
-    fn stepped<'a>(&'a self, shared: &'a Published) -> Option<Stepped<'a>> {
-        Some(Stepped {
-            isa: self.machine.isa,
-            pool: &self.machine.pool,
-            prior: self.model.prior.as_ref()?,
-            corrections: self.model.corrections().ok()?,
-            motion: &self.corrected.as_ref()?.solver.motion,
-            problem: self.problem.as_deref(),
-            rest: &self.mesh.positions,
-            u: &shared.last.field,
-            took_s: self.took_s,
-            integrator: self.integrator(),
-            let_go: (self.loads.as_ref()).map_or(0, |loads| loads.let_go()),
-        })
-    }
-
-    /// Publishes the last state for each hand.
-    pub(super) fn publish_to_hands(&mut self, published: &RwLock<Published>) {
-        if !HAS_INSTRUMENTS || self.hands.is_empty() {
-            return;
-        }
-        self.hands.retain(|hand| !hand.is_over());
-        let mut hands = std::mem::take(&mut self.hands);
-        let shared = lock_read(published);
-        if let Some(step) = self.stepped(&shared) {
-            for hand in &mut hands {
-                // The step is made and cannot fail any more: what lacked memory is tried once more, and then the hand goes on from the
-                // step before.
-                if let Err(error) = hand.publish(&step).or_else(|_| hand.publish(&step)) {
-                    tracing::error!("haptics: the step was not published: {error}");
-                }
-            }
-        }
-        drop(shared);
-        self.hands = hands;
     }
 }

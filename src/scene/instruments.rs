@@ -3,7 +3,7 @@
 use std::sync::MutexGuard;
 
 use super::Scene;
-use super::core::lock_read;
+use super::published::lock_read;
 use super::shared::lock;
 use super::tools::{Asked, Lists};
 use crate::contact::{ContactReport, MAX_TOOLS};
@@ -71,7 +71,7 @@ impl Scene {
         };
         let published = lock_read(&self.shared.published);
         if published.cut.is_some() {
-            return Err(super::cut::refused("contacts from instruments"));
+            return Err(super::body::refused("contacts from instruments"));
         }
         let step = Some(published.stats.step_count);
         let mut pairs = asked.instruments.iter().zip(instruments);

@@ -5,6 +5,7 @@
 //! REQ-017: A call stays within the stack that the C ABI's page states.
 
 mod bed;
+mod body;
 mod build;
 mod copied_loads;
 mod core;
@@ -12,8 +13,8 @@ mod correct;
 mod corrected;
 mod counters;
 mod cut;
+mod cut_motion;
 mod cut_state;
-mod cut_stresses;
 mod cut_surface;
 mod cutting;
 mod driven;
@@ -22,6 +23,7 @@ mod engine;
 mod followed_surface;
 mod frame_state;
 mod free_motion;
+mod hands;
 mod haptics;
 mod inputs;
 mod instruments;
@@ -30,6 +32,7 @@ mod linear;
 mod load_state;
 mod loading;
 mod loads;
+mod maker;
 mod own_pace;
 mod plan;
 mod points;
@@ -45,17 +48,21 @@ mod recording;
 mod reduced;
 mod region;
 mod shared;
+mod shown;
 mod snapshot;
 mod state;
 mod step_input;
+mod step_states;
 mod support;
 mod supports;
 mod ties;
 mod timing;
 mod tissue;
+mod tool_contact;
 mod tools;
 mod upt;
 mod verdict;
+mod watch;
 mod worker;
 
 use std::borrow::Cow;
@@ -86,9 +93,10 @@ use crate::replay::Recorder;
 use crate::replay::base64::Bytes;
 use crate::replay::lines::Line;
 use build::build;
-use core::{Core, lock_read};
+use core::Core;
 use points::AttachedPoints;
 use published::Published;
+use published::lock_read;
 use region::check_nodes;
 use shared::Shared;
 use tissue::Tissue;
@@ -132,9 +140,9 @@ impl Scene {
     pub fn new(model: Arc<Model>, options: &SceneOptions) -> Result<Scene> {
         let _span = tracing::info_span!("scene").entered();
         let core = build(&model, options, None)?;
-        let mesh = Arc::clone(&core.mesh);
-        let integrator = core.integrator();
-        let published = core.blank_published()?;
+        let mesh = Arc::clone(&core.maker.body.mesh);
+        let integrator = core.maker.body.integrator;
+        let published = Published::rest(&core)?;
         Ok(Scene {
             worker: Worker::new(options.latest_wins),
             shared: Arc::new(Shared::new(core, published)),
@@ -257,9 +265,9 @@ impl Scene {
         let line = |recorder: &mut Recorder| recorder.open(&line);
         self.told(line, |core, published| {
             if let Some(nodes) = nodes {
-                check_nodes(nodes, core.mesh.node_count())?;
+                check_nodes(nodes, core.maker.body.mesh.node_count())?;
             }
-            let points = Arc::clone(&core.points);
+            let points = Arc::clone(&core.maker.shown.points);
             let nodes = nodes.map(|nodes| memory::copied(nodes, "a region"));
             core.set_plan(published, nodes.transpose()?, points)
         })
@@ -283,24 +291,26 @@ impl Scene {
     /// ```
     pub fn attach_points(&self, points: Option<&[f32]>) -> Result<()> {
         self.with(|core, published| {
-            let mesh = core.intact_mesh();
+            let maker = &core.maker;
+            let mesh = maker.body.intact_mesh();
             let mut points = match points {
                 Some(points) => AttachedPoints::new(mesh, points)?,
                 None => AttachedPoints::default(),
             };
-            if let Some(cut) = &core.cut {
+            if let Some(cut) = &maker.body.cut {
                 points = points.following(mesh, Some(&cut.body))?;
             }
-            let interpolated = core.corrected.is_some() || core.options.interpolate_points;
-            match &core.model.kind {
+            let interpolated = maker.corrected.is_some() || maker.options.interpolate_points;
+            match &maker.body.model.kind {
                 KindModel::Upt(kind) if !interpolated && points.len() > 0 => {
-                    let threads = core.machine.pool.threads();
-                    let queries = kind.queries(points.places(), core.model.runtime()?, threads)?;
+                    let threads = maker.machine.pool.threads();
+                    let queries =
+                        kind.queries(points.places(), maker.body.model.runtime()?, threads)?;
                     points.set_queries(queries)?;
                 }
                 KindModel::Upt(_) | KindModel::Reduced(_) => {}
             }
-            let region = core.region_copy(published)?;
+            let region = lock_read(published).region_copy()?;
             core.set_plan(published, region, Arc::new(points))
         })
     }

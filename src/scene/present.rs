@@ -4,11 +4,14 @@
 
 use std::sync::{Arc, RwLock};
 
-use super::core::{Core, lock_read, lock_write};
+use super::core::Core;
+use super::corrected::Corrector;
 use super::frame_state::FrameState;
 use super::published::{Published, View};
+use super::published::{lock_read, lock_write};
 use super::shared::lock;
 use super::step_input::FrameInput;
+use super::step_states::StepStates;
 use super::supports;
 use super::{Scene, StepInput};
 use crate::contact::Past;
@@ -103,7 +106,8 @@ impl Scene {
 impl Core {
     /// From now on each published step leaves a moment.
     pub(super) fn start_frame_states(&mut self, published: &RwLock<Published>) -> Result<()> {
-        if self.corrected.is_none() {
+        let maker = &self.maker;
+        if maker.corrected.is_none() {
             return Err(Error::Unsupported(
                 "present: the scene makes no corrections (`corrections`); show its steps with upt_scene_sample".into(),
             ));
@@ -122,41 +126,49 @@ impl Core {
                 step: 0,
                 time_s: 0.0,
             };
-            let past = self.problem.as_ref().map(|problem| &problem.past);
-            frame_state.prepare(past, self.groups(false), self.contact.len())?;
+            let (past, groups) = (maker.tools.past(false), maker.loads.groups(false));
+            frame_state.prepare(past, groups, maker.states.contact.len())?;
             shared.frame_state = Some(frame_state);
         }
-        self.publish_frame_state(&mut shared);
+        shared.publish_frame_state(maker.corrected.as_deref(), &maker.states);
         Ok(())
     }
 
     /// Asks for all room that publishing the step being made takes: from there on nothing fails.
     pub(super) fn fit_published(&self, published: &RwLock<Published>) -> Result<()> {
+        let maker = &self.maker;
         let mut shared = lock_write(published);
-        let next = self.problem.as_ref().map(|problem| &problem.next);
+        let next = maker.tools.past(true);
         let counts = next.map_or((0, 0, 0), |next| {
             (next.tools.len(), next.ties.len(), next.forces.len())
         });
         shared.tools.fit(counts.0, counts.1, counts.2)?;
+        let (groups, nodes) = (maker.loads.groups(true), maker.states.incoming.len());
         match &mut shared.frame_state {
-            Some(frame_state) => frame_state.prepare(next, self.groups(true), self.incoming.len()),
+            Some(frame_state) => frame_state.prepare(next, groups, nodes),
             None => Ok(()),
         }
     }
 
     /// The same for a state that is about to be published without a step.
     pub(super) fn fit_state(&self, published: &RwLock<Published>) -> Result<()> {
-        let past = self.problem.as_ref().map(|problem| &problem.past);
+        let maker = &self.maker;
+        let (past, groups) = (maker.tools.past(false), maker.loads.groups(false));
         match &mut lock_write(published).frame_state {
-            Some(frame_state) => frame_state.prepare(past, self.groups(false), self.contact.len()),
+            Some(frame_state) => frame_state.prepare(past, groups, maker.states.contact.len()),
             None => Ok(()),
         }
     }
+}
 
+impl Published {
     /// Leaves the moment of the state that has just been published, where frames are made of it.
-    pub(super) fn publish_frame_state(&self, shared: &mut Published) {
-        let (Some(frame_state), Some(corrected)) = (&mut shared.frame_state, &self.corrected)
-        else {
+    pub(super) fn publish_frame_state(
+        &mut self,
+        corrected: Option<&Corrector>,
+        states: &StepStates,
+    ) {
+        let (Some(frame_state), Some(corrected)) = (&mut self.frame_state, corrected) else {
             return;
         };
         frame_state
@@ -167,13 +179,13 @@ impl Core {
         frame_state.nodes.clear();
         frame_state.forces.clear();
         let reaction = &corrected.solver.motion.reaction;
-        if frame_state.past.forces.is_empty() && reaction.len() == 3 * self.contact.len() {
-            frame_state.nodes.extend_from_slice(&self.contact.nodes);
+        if frame_state.past.forces.is_empty() && reaction.len() == 3 * states.contact.len() {
+            frame_state.nodes.extend_from_slice(&states.contact.nodes);
             frame_state
                 .forces
                 .extend(reaction.iter().map(|force| 1e-3 * force));
         }
         frame_state.step += 1;
-        frame_state.time_s = self.counters.time_s;
+        frame_state.time_s = states.counters.time_s;
     }
 }

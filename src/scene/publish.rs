@@ -2,9 +2,10 @@
 
 use std::sync::RwLock;
 
-use super::core::{Core, lock_read, lock_write};
-use super::counters::Source;
+use super::core::Core;
+use super::maker::StepMaker;
 use super::published::{Frame, Published};
+use super::published::{lock_read, lock_write};
 use crate::stats::SceneStats;
 
 /// A scene is asleep after this many steps of the bundle's length, or as much time in its own, without contact ...
@@ -25,121 +26,102 @@ impl Core {
         replaced: bool,
         stats: &SceneStats,
     ) {
-        let Frame { field, points } = &mut self.next;
-        self.points.add_interpolated(1.0, field, points);
-        self.engine.commit();
-        if let Some(corrected) = &mut self.corrected {
+        let maker = &mut self.maker;
+        let Frame { field, points } = &mut maker.states.next;
+        maker.shown.points.add_interpolated(1.0, field, points);
+        maker.engine.commit();
+        if let Some(corrected) = &mut maker.corrected {
             if replaced {
                 corrected.solver.stop_next();
             }
             corrected.solver.commit();
         }
-        self.counters.was_corrected = [
-            self.next_corrected && !replaced,
-            self.counters.was_corrected[0],
-        ];
-        if let Some(problem) = &mut self.problem {
-            problem.commit();
-        }
-        self.commit_loads();
-        self.counters.source_before = self.counters.source;
-        self.counters.source = if replaced {
-            Source::Fallback
-        } else {
-            Source::Model
+        maker.tools.commit();
+        maker.loads.commit();
+        maker.states.commit(replaced);
+        let largest = match replaced {
+            true => maker.largest_of_next(),
+            false => stats.max_displacement_mm,
         };
-        std::mem::swap(&mut self.contact_before, &mut self.contact);
-        std::mem::swap(&mut self.contact, &mut self.incoming);
-        self.counters.max_displacement = if replaced {
-            self.largest_of_next()
-        } else {
-            stats.max_displacement_mm
-        };
-        let quiet = self.contact.is_empty()
-            && !self.counters.was_corrected[0]
-            && !was_given
-            && (self.counters.max_displacement <= QUIET_DISPLACEMENT || self.is_still(published))
-            && self.engine.is_quiet(QUIET_DISPLACEMENT);
-        self.counters.quiet = if quiet { self.counters.quiet + 1 } else { 0 };
-        let steps = f64::from(QUIET_STEPS) * self.model.manifest.dt_s / self.step_s();
-        self.counters.sleeping =
-            self.options.sleep && f64::from(self.counters.quiet) >= steps - 1e-6;
-        self.counters.rest_frames = 0;
+        maker.states.counters.max_displacement = largest;
+        let quiet = !was_given && maker.is_quiet(published);
+        let counters = &mut maker.states.counters;
+        counters.quiet = if quiet { counters.quiet + 1 } else { 0 };
+        let body = &maker.body;
+        let steps = f64::from(QUIET_STEPS) * body.model.manifest.dt_s / body.step_s();
+        counters.sleeping = maker.options.sleep && f64::from(counters.quiet) >= steps - 1e-6;
+        counters.rest_frames = 0;
         self.rotate(published);
+    }
+
+    /// A step of a sleeping scene: exactly rest. The tools' poses are remembered, and none touches the tissue.
+    pub(super) fn publish_rest(&mut self, published: &RwLock<Published>) {
+        let maker = &mut self.maker;
+        maker.states.contact_before.clear();
+        maker.states.contact.clear();
+        maker.states.counters.max_displacement = 0.0;
+        maker.tools.clear_forces();
+        maker.tools.commit();
+        maker.tools.publish(&maker.body, &mut lock_write(published));
+        let frames = if maker.options.cubic_sampling { 4 } else { 3 };
+        let counters = &mut maker.states.counters;
+        if counters.rest_frames >= frames {
+            if let Some(frame_state) = &mut lock_write(published).frame_state {
+                frame_state.time_s = counters.time_s;
+            }
+            return;
+        }
+        counters.rest_frames += 1;
+        maker.engine.reset();
+        if let Some(corrected) = &mut maker.corrected {
+            corrected.solver.reset();
+        }
+        maker.states.rest_next();
+        self.rotate(published);
+    }
+
+    /// `next` becomes the last frame, the last the one before.
+    fn rotate(&mut self, published: &RwLock<Published>) {
+        let maker = &mut self.maker;
+        let mut shared = lock_write(published);
+        maker.states.rotate(&mut shared);
+        maker.states.show_contacts(&mut shared);
+        maker.tools.publish(&maker.body, &mut shared);
+        shared.publish_frame_state(maker.corrected.as_deref(), &maker.states);
+    }
+}
+
+impl StepMaker {
+    /// Whether nothing touches the state that is about to be published, and it lies still at rest or close to it.
+    fn is_quiet(&self, published: &RwLock<Published>) -> bool {
+        let counters = &self.states.counters;
+        self.states.contact.is_empty()
+            && !counters.was_corrected[0]
+            && (counters.max_displacement <= QUIET_DISPLACEMENT || self.is_still(published))
+            && self.engine.is_quiet(QUIET_DISPLACEMENT)
     }
 
     /// Whether `next` is close to rest and to the last state, with a model whose own fixed point may lie beside rest:
     /// what is left is then that model's bias, not motion.
     fn is_still(&self, published: &RwLock<Published>) -> bool {
-        let bias = self.model.manifest.rest_displacement_mm;
+        let bias = self.body.model.manifest.rest_displacement_mm;
         // Tissue that relaxes creeps back slower than that.
         let relaxes = self.corrected.as_ref().is_some_and(|own| own.relaxes);
-        if self.counters.max_displacement > bias + STILL_DISPLACEMENT
+        if self.states.counters.max_displacement > bias + STILL_DISPLACEMENT
             || self.engine.comes_to_rest()
             || relaxes
         {
             return false;
         }
         let shared = lock_read(published);
-        self.plan.nodes().iter().all(|&node| {
+        self.shown.plan.nodes().iter().all(|&node| {
             let at = 3 * node as usize;
-            let (now, last) = (&self.next.field[at..at + 3], &shared.last.field[at..at + 3]);
+            let (now, last) = (
+                &self.states.next.field[at..at + 3],
+                &shared.last.field[at..at + 3],
+            );
             let square: f32 = now.iter().zip(last).map(|(a, b)| (a - b) * (a - b)).sum();
             square <= STILL_CHANGE * STILL_CHANGE
         })
-    }
-
-    /// A step of a sleeping scene: exactly rest.
-    pub(super) fn publish_rest(&mut self, published: &RwLock<Published>) {
-        self.contact_before.clear();
-        self.contact.clear();
-        self.counters.max_displacement = 0.0;
-        self.commit_untouched_tools(published);
-        let frames = if self.options.cubic_sampling { 4 } else { 3 };
-        if self.counters.rest_frames >= frames {
-            if let Some(frame_state) = &mut lock_write(published).frame_state {
-                frame_state.time_s = self.counters.time_s;
-            }
-            return;
-        }
-        self.counters.rest_frames += 1;
-        self.engine.reset();
-        if let Some(corrected) = &mut self.corrected {
-            corrected.solver.reset();
-        }
-        self.counters.was_corrected = [false; 2];
-        self.counters.source_before = Source::Rest;
-        self.counters.source = Source::Rest;
-        self.next.field.fill(0.0);
-        self.next.points.fill(0.0);
-        self.rotate(published);
-    }
-
-    /// `next` becomes the last frame, the last the one before.
-    fn rotate(&mut self, published: &RwLock<Published>) {
-        let mut shared = lock_write(published);
-        let shared = &mut *shared;
-        if let Some(earlier) = &mut shared.earlier {
-            std::mem::swap(earlier, &mut shared.before);
-        }
-        std::mem::swap(&mut shared.before, &mut shared.last);
-        std::mem::swap(&mut shared.last, &mut self.next);
-        self.show_contacts(shared);
-        self.publish_tools(shared);
-        self.publish_frame_state(shared);
-    }
-
-    /// The last step's contacts in the host's order.
-    pub(super) fn show_contacts(&self, shared: &mut Published) {
-        shared.contact_nodes.clear();
-        shared.contact_vectors.clear();
-        shared.contact_nodes.resize(self.contact.len(), 0);
-        shared.contact_vectors.resize(3 * self.contact.len(), 0.0);
-        for (i, &at) in self.contact.order.iter().enumerate() {
-            let at = at as usize;
-            shared.contact_nodes[at] = self.contact.nodes[i];
-            shared.contact_vectors[3 * at..3 * at + 3]
-                .copy_from_slice(&self.contact.vectors[3 * i..3 * i + 3]);
-        }
     }
 }

@@ -1,9 +1,23 @@
 //! What other threads may read of a scene while a step is in flight: the last states, region order, statistics.
 
+use std::sync::{PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
 use crate::output::Output;
 use crate::stats::SceneStats;
+
+pub(super) const SCENE: &str = "a scene's states";
+
+/// Nothing panics while it writes: what a poisoned lock holds is whole.
+pub(super) fn lock_read(published: &RwLock<Published>) -> RwLockReadGuard<'_, Published> {
+    published.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// As [`lock_read`].
+pub(super) fn lock_write(published: &RwLock<Published>) -> RwLockWriteGuard<'_, Published> {
+    published.write().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Which body a scene has: operations lead from one to the next, `reset` and `restore` to another one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,7 +41,7 @@ impl Frame {
     /// Rest, without points.
     pub fn rest(node_count: usize) -> Result<Frame> {
         Ok(Frame {
-            field: memory::zeros(3 * node_count, "a scene's states")?,
+            field: memory::zeros(3 * node_count, SCENE)?,
             points: Vec::new(),
         })
     }

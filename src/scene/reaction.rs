@@ -12,6 +12,7 @@ use std::sync::RwLock;
 use super::Scene;
 use super::core::Core;
 use super::elastic::Haptics;
+use super::maker::StepMaker;
 use super::published::Published;
 use super::shared::lock;
 use crate::error::{Error, Result};
@@ -37,7 +38,7 @@ impl Scene {
     /// [`Scene::contact_force`] into memory that need not be initialised; a failed call leaves it as it is.
     pub(crate) fn contact_force_to(&self, out: Output<'_, f32>) -> Result<()> {
         self.with(|core, published| {
-            let want = 3 * core.contact.len();
+            let want = 3 * core.maker.states.contact.len();
             if out.len() != want {
                 return Err(Error::Argument(format!(
                     "out has {} floats, must have {want}: 3 for each contact node of the last step",
@@ -56,10 +57,10 @@ impl Scene {
 
     /// The reaction of corrections, of the linear response, or of the elements: of the first that there is.
     fn react(&self, core: &mut Core, published: &RwLock<Published>, out: &mut [f32]) -> Result<()> {
-        if core.corrected_reaction(out) || core.prior_reaction(out)? {
+        if core.maker.corrected_reaction(out) || prior_reaction(&mut core.maker, out)? {
             return Ok(());
         }
-        core.check_intact("contact_force")?;
+        core.maker.body.check_intact("contact_force")?;
         let mut haptics = lock(&self.tools.forces)?;
         let haptics = match &mut *haptics {
             Some(made) => made,
@@ -69,21 +70,20 @@ impl Scene {
     }
 }
 
-impl Core {
-    /// The reaction of the linear response to the last published contact; false where the scene has none.
-    fn prior_reaction(&mut self, out: &mut [f32]) -> Result<bool> {
-        let Some(linear) = self.engine.linear_mut() else {
-            return Ok(false);
-        };
-        let _mode = FlushToZero::of(self.machine.isa);
-        let contact = &self.contact;
-        // The last solve may be of a contact that the guard refused, or, after a restore, of another time. The factor is
-        // kept where the nodes are the same.
-        linear.solve_contact(self.machine.isa, &self.held, contact)?;
-        let table = &linear.table;
-        linear
-            .solve
-            .reaction(table, &self.held, &contact.nodes, &contact.order, out);
-        Ok(true)
-    }
+/// The reaction of the linear response to the last published contact, mN in the host's order; false where the scene has none.
+fn prior_reaction(maker: &mut StepMaker, out: &mut [f32]) -> Result<bool> {
+    let Some(linear) = maker.engine.linear_mut() else {
+        return Ok(false);
+    };
+    let isa = maker.machine.isa;
+    let _mode = FlushToZero::of(isa);
+    let (contact, held) = (&maker.states.contact, &maker.body.held);
+    // The last solve may be of a contact that the guard refused, or, after a restore, of another time. The factor is
+    // kept where the nodes are the same.
+    linear.solve_contact(isa, held, contact)?;
+    let table = &linear.table;
+    linear
+        .solve
+        .reaction(table, held, &contact.nodes, &contact.order, out);
+    Ok(true)
 }

@@ -1,8 +1,8 @@
 //! What a scene shows: its states at the region and at the attached points, the contacts of its last step, statistics.
 
 use super::Scene;
-use super::core::lock_read;
 use super::published::View;
+use super::published::lock_read;
 use crate::error::Result;
 use crate::output::Output;
 use crate::stats::SceneStats;

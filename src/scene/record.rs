@@ -6,9 +6,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
 use sha2::{Digest, Sha256};
 
-use super::core::lock_read;
 use super::loads::Loads;
 use super::published::Published;
+use super::published::lock_read;
 use super::step_input::{Contact, StepInput};
 use super::support::SupportPose;
 use crate::error::Result;

@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use super::Scene;
 use super::core::Core;
 use super::published::Published;
+use super::published::lock_read;
 use super::record::WHAT;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -106,7 +107,8 @@ impl Scene {
 impl Core {
     fn recorder(&self, published: &RwLock<Published>, every: u32) -> Result<Recorder> {
         let refused = |what: &str| Err(Error::Unsupported(format!("record: {what}")));
-        let options = &self.options;
+        let maker = &self.maker;
+        let options = &maker.options;
         if options.mesh_path.is_some() {
             return refused(
                 "the scene has a mesh of its own (mesh_path), which a recording cannot name",
@@ -120,25 +122,25 @@ impl Core {
                 "corrections.budget_us counts by the clock, so that no replay has its bits; give a count or a target",
             );
         }
-        let mut scene = SceneFields::new(options, self.engine.precision());
+        let mut scene = SceneFields::new(options, maker.engine.precision());
         if scene.step_path == StepPath::Measured {
-            scene.step_path = self.engine.path();
+            scene.step_path = maker.engine.path();
         }
         let header = Header {
             upt_replay: VERSION,
             libupt: env!("CARGO_PKG_VERSION").into(),
-            bundle: self.model.manifest.name.clone(),
-            bundle_sha256: Some(crate::bundle::hex(&self.model.hash)),
-            portable: self.machine.isa == crate::kernels::Isa::Portable,
+            bundle: maker.body.model.manifest.name.clone(),
+            bundle_sha256: Some(crate::bundle::hex(&maker.body.model.hash)),
+            portable: maker.machine.isa == crate::kernels::Isa::Portable,
             scene,
         };
-        let is_at_rest = self.counters.step_count == 0 && self.cut.is_none();
+        let is_at_rest = maker.states.counters.step_count == 0 && maker.body.cut.is_none();
         let state = match is_at_rest {
             true => None,
             false => Some(Line::Restore(Bytes(Cow::Owned(self.save(published)?)))),
         };
         let mut recorder = Recorder::new(&header, u64::from(every), state)?;
-        let region = self.region_copy(published)?;
+        let region = lock_read(published).region_copy()?;
         if let Some(region) = region {
             recorder.open(&Line::Region(Some(Cow::Owned(region))))?;
             recorder.close(|| [0; 32]);

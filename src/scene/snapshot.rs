@@ -13,7 +13,9 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use topology::{Body, Kept};
 
+use super::body::{MOST_COPIES, SceneBody, with_most_copies};
 use super::core::Core;
+use super::maker::StepMaker;
 use super::published::Published;
 use super::state::State;
 use crate::error::{Error, Result};
@@ -49,126 +51,21 @@ pub(super) fn has_body(bytes: &[u8]) -> bool {
     matches!(body, Ok((Some(_), _)))
 }
 
-impl Core {
-    fn origin(&self, driven: bool) -> Origin {
+impl Origin {
+    /// Of a scene with this body; `driven`: with instruments.
+    fn of(body: &SceneBody, driven: bool) -> Origin {
         Origin {
-            model: self.model.hash,
-            mesh: Sha256::digest(self.mesh.sha256.as_bytes()).into(),
-            step_us: (1e6 * self.step_s()).round() as u32,
-            damping_per_s: self.integrator().damping_per_s,
+            model: body.model.hash,
+            mesh: Sha256::digest(body.mesh.sha256.as_bytes()).into(),
+            step_us: (1e6 * body.step_s()).round() as u32,
+            damping_per_s: body.integrator.damping_per_s,
             driven,
         }
     }
 
-    /// The state as bytes.
-    pub(super) fn save(&self, published: &RwLock<Published>) -> Result<Vec<u8>> {
-        let state = self.state(published)?;
-        let body = self.cut.as_ref().map(|cut| cut.body.kept());
-        let whole = (self.origin(state.is_driven()), body, state);
-        let mut bytes = stored::write(&whole, HEAD, DIGEST)?;
-        bytes[..MAGIC.len()].copy_from_slice(MAGIC);
-        bytes[MAGIC.len()..HEAD].copy_from_slice(&VERSION.to_le_bytes());
-        let end = bytes.len() - DIGEST;
-        let (body, digest) = bytes.split_at_mut(end);
-        digest.copy_from_slice(&Sha256::digest(body));
-        Ok(bytes)
-    }
-
-    /// Takes a saved state; on error nothing has changed.
-    pub(super) fn restore(&mut self, published: &RwLock<Published>, bytes: &[u8]) -> Result<()> {
-        let (body, mut state) = self.read(bytes)?;
-        if body.is_some() || self.cut.is_some() {
-            return self.restore_body(published, body, state);
-        }
-        self.admit(&mut state)?;
-        // What is computed from it may still fail: the old state is kept until then.
-        let _mode = FlushToZero::of(self.machine.isa);
-        let old = self.state(published)?;
-        let taken = self
-            .put(published, state)
-            .and_then(|()| self.recompute(published));
-        let taken = taken.and_then(|()| self.fit_state(published));
-        if let Err(error) = taken {
-            // Fails only where a worker panics, which has been reported by then: the old state's lists had their room.
-            let _ = self.put(published, old);
-            return Err(error);
-        }
-        self.publish_state(published);
-        Ok(())
-    }
-
-    /// Takes a saved state of another body than the scene's, or of a cut one: a core is made for it.
-    fn restore_body(
-        &mut self,
-        published: &RwLock<Published>,
-        body: Option<Kept>,
-        mut state: State,
-    ) -> Result<()> {
-        let body = match body {
-            Some(kept) => {
-                let mesh = match &self.cut {
-                    Some(cut) => cut.body.shared_mesh(),
-                    None => self.whole_body()?.shared_mesh(),
-                };
-                Some(self.with_most_copies(Body::of_kept(mesh, kept)?))
-            }
-            None => None,
-        };
-        let mut next = self.with_body(body)?;
-        let shown = RwLock::new(next.blank_published()?);
-        next.admit(&mut state)?;
-        let _mode = FlushToZero::of(self.machine.isa);
-        next.put(&shown, state)?;
-        next.recompute(&shown)?;
-        next.fit_state(&shown)?;
-        let shown = shown.into_inner().unwrap_or_else(PoisonError::into_inner);
-        self.put_back(published, next, shown)
-    }
-
-    /// Reads a snapshot of this scene's: what its body was cut to, and the state.
-    fn read(&self, bytes: &[u8]) -> Result<(Option<Kept>, State)> {
-        // Asked first: a count that was never set is not followed to the end of the host's memory.
-        if bytes.len() > HEAD + self.most_bytes() + self.most_body_bytes() + DIGEST {
-            return Err(Error::Snapshot(format!(
-                "has {} bytes, more than any snapshot of this scene",
-                bytes.len()
-            )));
-        }
-        let Some(rest) = bytes.strip_prefix(MAGIC) else {
-            return Err(Error::Snapshot("is not a snapshot of a scene".into()));
-        };
-        let Some((version, rest)) = rest.split_first_chunk() else {
-            return Err(Error::Snapshot("is cut short".into()));
-        };
-        let version = u32::from_le_bytes(*version);
-        if version != VERSION {
-            return Err(Error::Version(format!(
-                "snapshot: version {version}, this library reads version {VERSION}"
-            )));
-        }
-        let Some((rest, digest)) = rest.split_last_chunk::<DIGEST>() else {
-            return Err(Error::Snapshot("is cut short".into()));
-        };
-        if Sha256::digest(&bytes[..bytes.len() - DIGEST]).as_slice() != digest {
-            return Err(Error::Snapshot(
-                "is damaged: its checksum does not match".into(),
-            ));
-        }
-        let (saved, rest) = stored::read::<Origin>(rest)?;
-        self.check_origin(&saved)?;
-        let (body, rest) = stored::read::<Option<Kept>>(rest)?;
-        let (state, rest) = stored::read::<State>(rest)?;
-        if !rest.is_empty() {
-            return Err(Error::Snapshot(format!(
-                "has {} bytes too many",
-                rest.len()
-            )));
-        }
-        Ok((body, state))
-    }
-
-    fn check_origin(&self, saved: &Origin) -> Result<()> {
-        let own = self.origin(saved.driven);
+    /// Whether a scene with this body takes what it says.
+    fn check(&self, body: &SceneBody) -> Result<()> {
+        let (saved, own) = (self, Origin::of(body, self.driven));
         if saved.model != own.model {
             return Err(Error::Snapshot("belongs to another model".into()));
         }
@@ -195,5 +92,125 @@ impl Core {
             ));
         }
         Ok(())
+    }
+}
+
+impl Core {
+    /// The state as bytes.
+    pub(super) fn save(&self, published: &RwLock<Published>) -> Result<Vec<u8>> {
+        let state = State::of(&self.maker, published)?;
+        let own = &self.maker.body;
+        let body = own.cut.as_ref().map(|cut| cut.body.kept());
+        let whole = (Origin::of(own, state.is_driven()), body, state);
+        let mut bytes = stored::write(&whole, HEAD, DIGEST)?;
+        bytes[..MAGIC.len()].copy_from_slice(MAGIC);
+        bytes[MAGIC.len()..HEAD].copy_from_slice(&VERSION.to_le_bytes());
+        let end = bytes.len() - DIGEST;
+        let (body, digest) = bytes.split_at_mut(end);
+        digest.copy_from_slice(&Sha256::digest(body));
+        Ok(bytes)
+    }
+
+    /// Takes a saved state; on error nothing has changed.
+    pub(super) fn restore(&mut self, published: &RwLock<Published>, bytes: &[u8]) -> Result<()> {
+        let maker = &mut self.maker;
+        let (body, mut state) = read(maker, bytes)?;
+        if body.is_some() || maker.body.cut.is_some() {
+            return self.restore_body(published, body, state);
+        }
+        state.admit(maker)?;
+        // What is computed from it may still fail: the old state is kept until then.
+        let _mode = FlushToZero::of(maker.machine.isa);
+        let old = State::of(maker, published)?;
+        let taken = state
+            .put(maker, published)
+            .and_then(|()| self.recompute(published));
+        let taken = taken.and_then(|()| self.fit_state(published));
+        if let Err(error) = taken {
+            // Fails only where a worker panics, which has been reported by then: the old state's lists had their room.
+            let _ = old.put(&mut self.maker, published);
+            return Err(error);
+        }
+        self.publish_state(published);
+        Ok(())
+    }
+
+    /// Takes a saved state of another body than the scene's, or of a cut one: a core is made for it.
+    fn restore_body(
+        &mut self,
+        published: &RwLock<Published>,
+        body: Option<Kept>,
+        mut state: State,
+    ) -> Result<()> {
+        let body = match body {
+            Some(kept) => {
+                let own = &self.maker.body;
+                let mesh = match &own.cut {
+                    Some(cut) => cut.body.shared_mesh(),
+                    None => own.whole_body()?.shared_mesh(),
+                };
+                Some(with_most_copies(Body::of_kept(mesh, kept)?))
+            }
+            None => None,
+        };
+        let mut next = self.with_body(body)?;
+        let shown = RwLock::new(Published::rest(&next)?);
+        state.admit(&next.maker)?;
+        let _mode = FlushToZero::of(self.maker.machine.isa);
+        state.put(&mut next.maker, &shown)?;
+        next.recompute(&shown)?;
+        next.fit_state(&shown)?;
+        let shown = shown.into_inner().unwrap_or_else(PoisonError::into_inner);
+        self.put_back(published, next, shown)
+    }
+}
+
+/// Reads a snapshot of a scene's: what its body was cut to, and the state.
+fn read(maker: &StepMaker, bytes: &[u8]) -> Result<(Option<Kept>, State)> {
+    // Asked first: a count that was never set is not followed to the end of the host's memory.
+    if bytes.len() > HEAD + State::most_bytes(maker) + most_body_bytes(maker) + DIGEST {
+        return Err(Error::Snapshot(format!(
+            "has {} bytes, more than any snapshot of this scene",
+            bytes.len()
+        )));
+    }
+    let Some(rest) = bytes.strip_prefix(MAGIC) else {
+        return Err(Error::Snapshot("is not a snapshot of a scene".into()));
+    };
+    let Some((version, rest)) = rest.split_first_chunk() else {
+        return Err(Error::Snapshot("is cut short".into()));
+    };
+    let version = u32::from_le_bytes(*version);
+    if version != VERSION {
+        return Err(Error::Version(format!(
+            "snapshot: version {version}, this library reads version {VERSION}"
+        )));
+    }
+    let Some((rest, digest)) = rest.split_last_chunk::<DIGEST>() else {
+        return Err(Error::Snapshot("is cut short".into()));
+    };
+    if Sha256::digest(&bytes[..bytes.len() - DIGEST]).as_slice() != digest {
+        return Err(Error::Snapshot(
+            "is damaged: its checksum does not match".into(),
+        ));
+    }
+    let (saved, rest) = stored::read::<Origin>(rest)?;
+    saved.check(&maker.body)?;
+    let (body, rest) = stored::read::<Option<Kept>>(rest)?;
+    let (state, rest) = stored::read::<State>(rest)?;
+    if !rest.is_empty() {
+        return Err(Error::Snapshot(format!(
+            "has {} bytes too many",
+            rest.len()
+        )));
+    }
+    Ok((body, state))
+}
+
+/// Bytes of what a snapshot says of a cut body, at most, with its longer fields.
+fn most_body_bytes(maker: &StepMaker) -> usize {
+    match maker.corrected {
+        Some(_) => MOST_COPIES * State::most_bytes(maker) + 4096 * maker.body.mesh.tets.len() / 4,
+        None => 0,
     }
 }

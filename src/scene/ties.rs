@@ -5,7 +5,7 @@
 use ::contact::{End, Sample, Tie, Vector};
 
 use super::StepInput;
-use super::core::Core;
+use super::body::SceneBody;
 use crate::contact::{Placed, ties};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -21,73 +21,56 @@ fn points_of(tie: &Tie) -> impl Iterator<Item = Sample> {
     [Some(tie.point), far].into_iter().flatten()
 }
 
-impl Core {
-    /// Whether cuts and resections have left nothing around a node of the intact mesh.
-    fn is_gone(&self, node: u32) -> bool {
-        let Some(corrected) = self.cut.as_ref().and(self.model.corrections().ok()) else {
-            return false;
+/// Takes the ties of a step with so many tools.
+///
+/// # Errors
+/// [`Error::Argument`] and [`Error::NonFinite`] with the tie and its field, [`Error::OutOfMemory`].
+pub(super) fn place(
+    placed: &mut Vec<Placed>,
+    body: &SceneBody,
+    input: &StepInput<'_>,
+    tools: usize,
+) -> Result<()> {
+    let given = input.loads.ties;
+    let (prior, held) = (&body.model.prior, &body.held);
+    // A place in the list that holds nothing may name tissue that is gone.
+    let is_idle = |node: u32| {
+        let has = |point: &Sample| point.entries().any(|(own, _)| own == node);
+        let mut of_it = given
+            .iter()
+            .filter(|tie| points_of(tie).any(|point| has(&point)));
+        body.is_gone(node) && of_it.all(|tie| tie.spring.stiffness == 0.0)
+    };
+    let moves = |node: u32| {
+        let prior = prior.as_ref();
+        let column = prior.and_then(|prior| prior.column_for(held, node));
+        column.is_some() || is_idle(node)
+    };
+    let count = body.intact_mesh().node_count();
+    for (index, tie) in given.iter().enumerate() {
+        let is_gone = |point: &Sample| {
+            let mut nodes = point.entries().map(|(node, _)| node);
+            nodes.all(|node| (node as usize) < count && body.is_gone(node))
         };
-        corrected.body.mass.get(node as usize) == Some(&0.0)
-    }
-
-    /// # Errors
-    /// [`Error::Unsupported`] for ties in a scene that makes no corrections.
-    pub(super) fn check_ties(&self, ties: &[Tie]) -> Result<()> {
-        match ties.is_empty() || self.corrected.is_some() {
-            true => Ok(()),
-            false => Err(Error::Unsupported(
-                "ties: the scene makes no corrections, in which ties pull; set `corrections`"
-                    .into(),
-            )),
+        let mut points = points_of(tie);
+        if let (true, Some(point)) = (tie.spring.stiffness > 0.0, points.find(is_gone)) {
+            return Err(Error::Argument(format!(
+                "ties[{index}]: of its nodes {:?} the body has nothing left; give it a stiffness of 0",
+                point.nodes
+            )));
         }
     }
-
-    /// Takes the ties of a step with so many tools.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] and [`Error::NonFinite`] with the tie and its field, [`Error::OutOfMemory`].
-    pub(super) fn place_ties(&mut self, input: &StepInput<'_>, tools: usize) -> Result<()> {
-        let given = input.loads.ties;
-        let (prior, held) = (&self.model.prior, &self.held);
-        // A place in the list that holds nothing may name tissue that is gone.
-        let is_idle = |node: u32| {
-            let has = |point: &Sample| point.entries().any(|(own, _)| own == node);
-            let mut of_it = given
-                .iter()
-                .filter(|tie| points_of(tie).any(|point| has(&point)));
-            self.is_gone(node) && of_it.all(|tie| tie.spring.stiffness == 0.0)
-        };
-        let moves = |node: u32| {
-            let prior = prior.as_ref();
-            let column = prior.and_then(|prior| prior.column_for(held, node));
-            column.is_some() || is_idle(node)
-        };
-        let count = self.intact_mesh().node_count();
-        for (index, tie) in given.iter().enumerate() {
-            let is_gone = |point: &Sample| {
-                let mut nodes = point.entries().map(|(node, _)| node);
-                nodes.all(|node| (node as usize) < count && self.is_gone(node))
-            };
-            let mut points = points_of(tie);
-            if let (true, Some(point)) = (tie.spring.stiffness > 0.0, points.find(is_gone)) {
-                return Err(Error::Argument(format!(
-                    "ties[{index}]: of its nodes {:?} the body has nothing left; give it a stiffness of 0",
-                    point.nodes
-                )));
-            }
-        }
-        ties::check(given, tools, count, moves)?;
-        let support = input.loads.support.map(|pose| pose.checked()).transpose()?;
-        self.placed_ties.clear();
-        memory::fit(&mut self.placed_ties, given.len(), WHAT)?;
-        self.placed_ties.extend(given.iter().map(|tie| Placed {
-            tie: *tie,
-            place: match (tie.end, &support) {
-                (End::World(place), Some(support)) => support.inverse_transform_point(place),
-                (End::World(place) | End::Support(place) | End::Tool { place, .. }, _) => place,
-                (End::Tissue(_), _) => Vector::ZERO,
-            },
-        }));
-        Ok(())
-    }
+    ties::check(given, tools, count, moves)?;
+    let support = input.loads.support.map(|pose| pose.checked()).transpose()?;
+    placed.clear();
+    memory::fit(placed, given.len(), WHAT)?;
+    placed.extend(given.iter().map(|tie| Placed {
+        tie: *tie,
+        place: match (tie.end, &support) {
+            (End::World(place), Some(support)) => support.inverse_transform_point(place),
+            (End::World(place) | End::Support(place) | End::Tool { place, .. }, _) => place,
+            (End::Tissue(_), _) => Vector::ZERO,
+        },
+    }));
+    Ok(())
 }

@@ -12,8 +12,8 @@ use std::time::Duration;
 use crate::clock::Instant;
 
 use super::copied_loads::CopiedLoads;
-use super::core::lock_read;
 use super::loads::Loads;
+use super::published::lock_read;
 use super::shared::Shared;
 use super::{Contact, Progress, StepInput};
 use crate::bundle::Mesh;

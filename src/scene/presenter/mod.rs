@@ -14,8 +14,8 @@ mod touched;
 
 use std::sync::Arc;
 
-use super::core::lock_read;
 use super::points::AttachedPoints;
+use super::published::lock_read;
 use super::published::{Published, View};
 use super::step_input::FrameInput;
 use super::tissue::Tissue;

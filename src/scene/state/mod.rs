@@ -4,23 +4,25 @@
 //! What a part is, how it is written, and what of it follows from the rest is said where the part is declared.
 
 mod records;
-mod tools;
 
 use std::sync::RwLock;
 
 use serde::{Deserialize, Serialize};
 
-use super::core::{Core, lock_read, lock_write};
+use super::core::Core;
 use super::counters::Counters;
 use super::engine::Engine;
+use super::loading;
 use super::loads::Acting;
+use super::maker::StepMaker;
 use super::published::Published;
+use super::published::{lock_read, lock_write};
+use crate::contact::Past;
 use crate::corrections::{History, PAIRS};
 use crate::error::{Error, Result};
 use crate::field::ContactSet;
 use crate::{memory, stored};
 use records::Records;
-use tools::Tools;
 
 /// What lasts from one step to the next. Region, attached points and options are the host's and are not part of it.
 #[derive(Debug, Serialize, Deserialize)]
@@ -38,7 +40,7 @@ pub struct State {
     /// Loads beside contact; none where none act.
     acting: Option<Acting>,
     /// Of instruments; none where none were used.
-    tools: Option<Tools>,
+    tools: Option<Past>,
 }
 
 /// `[K,3]`, mm.
@@ -50,12 +52,11 @@ impl State {
     pub(super) fn is_driven(&self) -> bool {
         self.tools.is_some()
     }
-}
 
-impl Core {
     /// A copy of the state.
-    pub(super) fn state(&self, published: &RwLock<Published>) -> Result<State> {
-        let fields = if self.keeps_all_nodes() {
+    pub(super) fn of(maker: &StepMaker, published: &RwLock<Published>) -> Result<State> {
+        let states = &maker.states;
+        let fields = if maker.keeps_all_nodes() {
             let shared = lock_read(published);
             let copy = |field: &[f32]| memory::copied(field, "a copy of a scene's fields");
             let (last, before) = (copy(&shared.last.field)?, copy(&shared.before.field)?);
@@ -63,36 +64,38 @@ impl Core {
         } else {
             None
         };
-        let corrected = self.corrected.as_ref();
+        let corrected = maker.corrected.as_ref();
         Ok(State {
-            counters: self.counters,
-            contact: self.contact.copy()?,
-            contact_before: self.contact_before.copy()?,
-            records: self.engine.records()?,
+            counters: states.counters,
+            contact: states.contact.copy()?,
+            contact_before: states.contact_before.copy()?,
+            records: maker.engine.records()?,
             fields,
             history: corrected
-                .map(|corrected| corrected.solver.history(self.contact.len()))
+                .map(|corrected| corrected.solver.history(states.contact.len()))
                 .transpose()?,
-            acting: self.acting()?,
-            tools: self.tools()?,
+            acting: maker.loads.acting()?,
+            tools: maker.tools.saved()?,
         })
     }
 
     /// Bytes of a saved state at most.
-    pub(super) fn most_bytes(&self) -> usize {
-        let count = self.mesh.node_count();
+    pub(super) fn most_bytes(maker: &StepMaker) -> usize {
+        let count = maker.body.mesh.node_count();
         // Three velocities, loads, contact forces, pairs; of local ones six fields, and numbers of chunks and modes.
-        let history = self.corrected.as_ref().map(|corrected| {
+        let history = maker.corrected.as_ref().map(|corrected| {
             let stresses = corrected.solver.remembered_bytes();
             (5 + 8 * PAIRS) * 12 * count + PAIRS * 16384 + stresses
         });
         let (contacts, fields) = (2 * 16 * count, 2 * 12 * count);
-        let rest = history.unwrap_or(0) + self.tool_bytes() + self.load_bytes() + 2048;
-        self.engine.record_bytes() + contacts + fields + rest
+        let tools = maker.tools.saved_bytes(&maker.body);
+        let loads = loading::saved_bytes(&maker.body);
+        let rest = history.unwrap_or(0) + tools + loads + 2048;
+        maker.engine.record_bytes() + contacts + fields + rest
     }
 
     /// Checks a state that was read, and makes room for what follows from it.
-    pub(super) fn admit(&self, state: &mut State) -> Result<()> {
+    pub(super) fn admit(&mut self, maker: &StepMaker) -> Result<()> {
         let State {
             counters,
             contact,
@@ -102,16 +105,16 @@ impl Core {
             history,
             acting,
             tools,
-        } = state;
-        let count = self.mesh.node_count();
+        } = self;
+        let count = maker.body.mesh.node_count();
         stored::check(&[counters.max_displacement], 1)?;
         if !counters.time_s.is_finite() {
             return Err(Error::Snapshot("its time is not finite".into()));
         }
         contact.admit(count)?;
         contact_before.admit(count)?;
-        self.engine.admit(records)?;
-        match (&history, &self.corrected) {
+        maker.engine.admit(records)?;
+        match (&history, &maker.corrected) {
             (Some(history), Some(corrected)) => {
                 history.check(3 * count, contact.len())?;
                 corrected.solver.admit(history)?;
@@ -123,7 +126,7 @@ impl Core {
                 ));
             }
         }
-        match (&fields, self.keeps_all_nodes()) {
+        match (&fields, maker.keeps_all_nodes()) {
             (None, true) => {
                 return Err(Error::Snapshot(
                     "was saved by a scene that steps without step.onnx; restore it in a scene with `step_path` split".into(),
@@ -136,21 +139,21 @@ impl Core {
             }
             (None, false) => {}
         }
-        if !self.keeps_all_nodes() {
+        if !maker.keeps_all_nodes() {
             // Decoded again.
             *fields = None;
         }
         if let Some(acting) = acting {
-            acting.admit(&self.mesh)?;
+            acting.admit(&maker.body.mesh)?;
         }
         match tools {
-            Some(tools) => self.admit_tools(tools),
+            Some(tools) => tools.check(&*maker.body.model.samples()?, count),
             None => Ok(()),
         }
     }
 
     /// Takes a state that is the scene's own or was admitted; the room of its lists stays.
-    pub(super) fn put(&mut self, published: &RwLock<Published>, state: State) -> Result<()> {
+    pub(super) fn put(self, maker: &mut StepMaker, published: &RwLock<Published>) -> Result<()> {
         let State {
             counters,
             contact,
@@ -160,56 +163,68 @@ impl Core {
             history,
             acting,
             tools,
-        } = state;
-        self.counters = counters;
+        } = self;
+        maker.states.counters = counters;
         // There is room for all nodes.
-        self.contact.copy_from(&contact)?;
-        self.contact_before.copy_from(&contact_before)?;
+        maker.states.contact.copy_from(&contact)?;
+        maker.states.contact_before.copy_from(&contact_before)?;
         if let Some([Field(last), Field(before)]) = fields {
             let mut shared = lock_write(published);
             (shared.last.field, shared.before.field) = (last, before);
         }
-        self.engine.put(records)?;
-        self.put_tools(tools)?;
-        self.put_acting(acting)?;
-        self.put_history(history)
+        maker.engine.put(records)?;
+        maker.tools.put(&maker.body, tools)?;
+        maker.loads.put(&maker.body, acting)?;
+        match (&mut maker.corrected, history) {
+            (Some(corrected), Some(history)) => {
+                let time_step = &corrected.time_step;
+                let context = (maker.loads).context(&maker.body, &maker.machine, time_step)?;
+                context.map_or(Ok(()), |context| {
+                    corrected.solver.restore(context, &history)
+                })
+            }
+            _ => Ok(()),
+        }
     }
+}
 
+impl Core {
     /// What a state leaves out because it follows from the rest.
     pub(super) fn recompute(&mut self, published: &RwLock<Published>) -> Result<()> {
-        match &mut self.engine {
+        let maker = &mut self.maker;
+        let states = &maker.states;
+        match &mut maker.engine {
             Engine::Reduced(engine) => engine.rebuild(
-                self.machine.compute(),
-                &self.held,
-                &self.contact_before,
-                &self.contact,
+                maker.machine.compute(),
+                &maker.body.held,
+                &states.contact_before,
+                &states.contact,
             )?,
             // The plan's nodes alone, below.
             Engine::Upt(_) => {}
         }
-        let region = self.region_copy(published)?;
-        let points = std::sync::Arc::clone(&self.points);
+        let region = lock_read(published).region_copy()?;
+        let points = std::sync::Arc::clone(&maker.shown.points);
         self.set_plan(published, region, points)
     }
 
     /// Back to rest.
     pub(super) fn reset(&mut self, published: &RwLock<Published>) -> Result<()> {
-        if self.cut.is_some() {
+        if self.maker.body.cut.is_some() {
             let next = self.with_body(None)?;
-            let shown = next.blank_published()?;
+            let shown = Published::rest(&next)?;
             return self.put_back(published, next, shown);
         }
-        self.counters = Counters::REST;
-        self.contact.clear();
-        self.contact_before.clear();
-        self.clear_loads();
-        self.engine.reset();
-        if let Some(corrected) = &mut self.corrected {
+        let maker = &mut self.maker;
+        maker.states.counters = Counters::REST;
+        maker.states.contact.clear();
+        maker.states.contact_before.clear();
+        maker.loads.clear();
+        maker.engine.reset();
+        if let Some(corrected) = &mut maker.corrected {
             corrected.solver.reset();
         }
-        if let Some(problem) = &mut self.problem {
-            problem.reset();
-        }
+        maker.tools.reset();
         {
             let mut shared = lock_write(published);
             let shared = &mut *shared;
@@ -221,7 +236,7 @@ impl Core {
                 frame.points.fill(0.0);
             }
         }
-        self.logged_flags = 0;
+        maker.watch.logged_flags = 0;
         // Of empty lists, for which there is room.
         self.fit_state(published)?;
         self.publish_state(published);
@@ -232,10 +247,11 @@ impl Core {
     pub(super) fn publish_state(&mut self, published: &RwLock<Published>) {
         let mut shared = lock_write(published);
         shared.stats = self.blank_stats();
-        self.show_contacts(&mut shared);
+        let maker = &self.maker;
+        maker.states.show_contacts(&mut shared);
         shared.tools.clear();
-        self.publish_frame_state(&mut shared);
+        shared.publish_frame_state(maker.corrected.as_deref(), &maker.states);
         drop(shared);
-        self.publish_to_hands(published);
+        self.hands.publish(maker, published);
     }
 }
