@@ -32,21 +32,24 @@ impl StepMaker {
         };
         let is_prescribed = !self.states.incoming.is_empty();
         let is_cut = self.body.cut.is_some();
-        if is_prescribed || (problem.tools().is_empty() && !near && !is_cut) {
+        if is_prescribed || (problem.ways.tools.is_empty() && !near && !is_cut) {
             return Ok(false);
         }
         if self.corrected.is_none() {
             return self.drive_linear(published, near, stats);
         }
-        if is_cut || problem.has_ties() {
+        if is_cut || problem.tied.has_any() {
             self.load(published, start, stats)?;
             return Ok(true);
         }
-        if near && (problem.had_forces() || problem.has_grasp()) {
+        if near && (problem.past.has_forces() || problem.next.has_grasp()) {
             let before = *stats;
             self.load(published, start, stats)?;
             let tools = &self.tools.problem;
-            if tools.as_ref().is_some_and(|problem| problem.has_forces()) {
+            if tools
+                .as_ref()
+                .is_some_and(|problem| problem.next.has_forces())
+            {
                 return Ok(true);
             }
             // No tool pushes in that state: drop it together with its statistics.
@@ -126,7 +129,7 @@ impl StepMaker {
         let made_of = report.substeps.max(1) as f32;
         let step_s = self.body.step_s() as f32 / made_of;
         let covered = corrected.covers_tools(&self.body.model);
-        self.tools.used = covered.then(|| problem.used(step_s));
+        self.tools.used = covered.then(|| problem.ways.used(&problem.next, step_s));
         self.tools.report_depth(stats);
         stats.corrections_ms = watch.lap();
         self.predict_and_decode(published, None, false, stats)

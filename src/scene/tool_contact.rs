@@ -92,11 +92,12 @@ impl ToolContact {
         stats: &mut SceneStats,
     ) {
         if let Some(problem) = &mut self.problem {
-            problem.finish(State {
+            let state = State {
                 rest: &body.mesh.positions,
                 u: next,
                 start,
-            });
+            };
+            problem.finish(state, true);
         }
         self.report_depth(stats);
     }
@@ -106,7 +107,7 @@ impl ToolContact {
         let Some(problem) = &self.problem else {
             return;
         };
-        stats.contact_ms = problem.spent_ms();
+        stats.contact_ms = problem.solution.spent_ms();
         let readings = problem.next.tools.iter().map(|held| held.reading);
         if readings
             .clone()
@@ -115,7 +116,7 @@ impl ToolContact {
             stats.flags |= flag::UNSOLVED;
         }
         let deepest = readings.map(|r| r.penetration_mm).fold(0.0, f32::max);
-        if deepest > DEEP_MM || problem.lay_in_tissue {
+        if deepest > DEEP_MM || problem.ways.lay_in_tissue {
             stats.flags |= flag::DEEP;
         }
     }
@@ -130,7 +131,7 @@ impl ToolContact {
     /// Nothing pushes the tissue.
     pub fn clear_forces(&mut self) {
         if let Some(problem) = &mut self.problem {
-            problem.clear_forces();
+            problem.next.forces.clear();
         }
     }
 

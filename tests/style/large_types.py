@@ -37,7 +37,6 @@ RECORDS = {
 LARGER: dict[str, tuple[int, int]] = {
     "bundle::Mesh": (15, 12),
     "implicit::ColumnCompliance": (11, 9),
-    "implicit::ContactProblem": (38, 82),
     "implicit::Delassus": (11, 6),
     "implicit::FarField": (13, 11),
     "implicit::ImplicitSolver": (22, 84),

@@ -105,7 +105,7 @@ impl Between {
         let natural = corrections.space.natural_count();
         let problem = ContactProblem::new(model.samples()?, Arc::clone(&model.mesh))?;
         Ok(Between {
-            touched: TouchedTissue::new(prior, problem.nodes(), count)?,
+            touched: TouchedTissue::new(prior, problem.surface.samples.nodes(), count)?,
             shown: None,
             problem,
             other: KnownStep {
@@ -241,7 +241,7 @@ impl Between {
         // What is shown, and where contact is looked at.
         let touched = match (known, question.drive) {
             (Some(_), Drive::Nodes(_)) => &[][..],
-            (_, Drive::Tools(_)) => self.problem.nodes(),
+            (_, Drive::Tools(_)) => self.problem.surface.samples.nodes(),
             (None, Drive::Nodes(now)) => &now.nodes,
         };
         for nodes in [touched, view.region] {
@@ -287,7 +287,7 @@ impl Between {
                 }
             };
             self.problem.begin_frame(tools, rest, last)?;
-            self.problem.take_length(tau as f32);
+            self.problem.tied.step_s = tau as f32;
             let state = State {
                 rest,
                 u: &self.free,
@@ -305,11 +305,11 @@ impl Between {
             response.add(change, &mut self.natural, false, q)?;
             // As in a step: a quick or thin tool that has lost the contact is pressed again about where the tissue has come to.
             for _ in 0..MORE_PRESSES {
-                if !self.problem.may_lose() || self.problem.work.is_spent() {
+                if !self.problem.ways.may_lose() || self.problem.work.is_spent() {
                     break;
                 }
                 let means = (self.isa, &self.pool, &**prior);
-                let where_touched = (self.problem.nodes(), &*self.held);
+                let where_touched = (self.problem.surface.samples.nodes(), &*self.held);
                 let touched = &mut self.touched;
                 touched.place(means, where_touched, &self.free, Some(q))?;
                 if !touched.has_lost(&mut self.problem, rest, last) {
@@ -373,11 +373,11 @@ impl Between {
         };
         let (rest, last) = (scene.mesh.positions.as_slice(), self.last.as_slice());
         self.problem.begin_frame(tools, rest, last)?;
-        if !self.problem.may_lose() {
+        if !self.problem.ways.may_lose() {
             return Ok(false);
         }
         let q = self.shown.and_then(|place| solves.moves(place));
-        let nodes = (self.problem.nodes(), &*self.held);
+        let nodes = (self.problem.surface.samples.nodes(), &*self.held);
         let means = (self.isa, &self.pool, &**prior);
         self.touched.place(means, nodes, &self.free, q)?;
         self.touched.replace(region, u);

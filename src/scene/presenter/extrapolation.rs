@@ -82,7 +82,7 @@ impl VelocityExtrapolation {
         (tau, alpha): (f64, f64),
     ) {
         self.driven.clear();
-        self.free = match problem.had_forces() {
+        self.free = match problem.past.has_forces() {
             true => tau as f32,
             false => slowed(tau, alpha),
         };
@@ -91,7 +91,7 @@ impl VelocityExtrapolation {
             let own = own.filter(|force| force.tool as usize == index);
             let (mut centre, mut sum) = (Vector::ZERO, 0.0);
             for force in own {
-                let sample = problem.sample(force.sample);
+                let sample = problem.surface.samples.at(force.sample);
                 let point = sample.gather(|node| vector(rest, node) + vector(u, node));
                 let size = force.force.length();
                 centre += point * size;

@@ -76,7 +76,7 @@ impl TouchedTissue {
             u,
             start: last,
         };
-        problem.may_lose() && problem.sunk(state, 1.0) > KEPT_MM
+        problem.ways.may_lose() && problem.depths().sunk(state, 1.0) > KEPT_MM
     }
 
     /// The surface's displacement.

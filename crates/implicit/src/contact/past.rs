@@ -80,6 +80,34 @@ impl Past {
         })
     }
 
+    /// Whether forces are at work.
+    pub fn has_forces(&self) -> bool {
+        !self.forces.is_empty()
+    }
+
+    /// Whether tools push.
+    pub fn tools_push(&self) -> bool {
+        self.forces.iter().any(|force| force.tool != NO_TOOL)
+    }
+
+    /// Whether a grasper holds a sample.
+    pub fn has_grasp(&self) -> bool {
+        let holds = |held: &Held| !held.grasp.anchors().is_empty();
+        self.tools.iter().any(holds)
+    }
+
+    /// Whether a grasp has torn off in the step.
+    pub fn tears(&self) -> bool {
+        self.tools.iter().any(|held| held.reading.torn)
+    }
+
+    /// Multiplies all forces.
+    pub fn scale_forces(&mut self, factor: f32) {
+        for force in &mut self.forces {
+            force.force *= factor;
+        }
+    }
+
     /// Checks what was read against the samples of the surface of a body of so many nodes.
     ///
     /// # Errors

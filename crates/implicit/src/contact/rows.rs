@@ -11,6 +11,10 @@ use crate::memory::HeldBytes;
 
 /// Samples that one solve may have: what a tool as large as the organ touches beyond these is left to the next solve.
 pub(super) const MOST_ROWS: usize = 256;
+/// Tissue that is farther from a tool is not pushed by it, mm.
+pub(super) const OPEN_MM: f32 = 0.5;
+/// What lacks memory.
+pub(super) const WHAT: &str = "the contact of instruments";
 
 /// Longest way out of a tool, or to its far side, mm.
 const THROUGH_MM: f32 = 45.0;

@@ -94,7 +94,7 @@ impl ImplicitSolver {
             return Ok(whole);
         }
         // A tool that the whole step stopped on its way is where the host has put it again.
-        problem.aim();
+        problem.ways.aim();
         let parts = self.drive_substeps(context, input, problem, (substeps, substepper), next)?;
         Ok(whole.and(&parts))
     }
@@ -115,18 +115,18 @@ impl ImplicitSolver {
         )?;
         substeps.past.take(&problem.past)?;
         substeps.tools.clear();
-        substeps.tools.extend_from_slice(problem.tools());
+        substeps.tools.extend_from_slice(&problem.ways.tools);
         substeps.from.clear();
-        substeps.from.extend_from_slice(problem.before());
-        memory::replace(&mut substeps.ties, problem.ties(), WHAT)?;
-        memory::replace(&mut substeps.tied_from, problem.tied_from(), WHAT)?;
+        substeps.from.extend_from_slice(&problem.ways.before);
+        memory::replace(&mut substeps.ties, &problem.tied.list, WHAT)?;
+        memory::replace(&mut substeps.tied_from, &problem.tied.from, WHAT)?;
         memory::fit(&mut substeps.tied, substeps.ties.len(), WHAT)?;
         self.exchange(substepper);
-        problem.exchange(&mut substeps.responses);
+        problem.solution.responses.exchange(&mut substeps.responses);
         // Solver and contact have the shorter steps' diagonal, pasts and responses between these two exchanges, and their own again after them, also where it fails.
         let result = self.each_substep(context, input, problem, (substeps, substepper));
         self.exchange(substepper);
-        problem.exchange(&mut substeps.responses);
+        problem.solution.responses.exchange(&mut substeps.responses);
         // The pairs are those of shorter steps.
         self.begin_pairs();
         std::mem::swap(&mut problem.past, &mut substeps.past);

@@ -65,7 +65,7 @@ impl ImplicitSolver {
         next: &mut [f32],
     ) -> Result<Report> {
         self.nodes.clear();
-        problem.take_length(context.time_step.integrator.step_s as f32);
+        problem.tied.step_s = context.time_step.integrator.step_s as f32;
         // Contact is a load here, and nothing is prescribed: the pairs of the whole field hold at every node.
         self.memory.mask(&[]);
         self.expect(context, input)?;
@@ -117,7 +117,7 @@ impl ImplicitSolver {
         }
         // `fall_back` and `recover` come back to it.
         self.guess.copy_from_slice(at.u);
-        problem.keep_guess()?;
+        problem.kept.keep_guess(&problem.next)?;
         let mut size = self.improve_loaded(context, input, problem, at, report)?;
         if !is_sound(size, at.det) {
             size = self.recover(context, input, problem, at, report)?;
@@ -173,12 +173,12 @@ impl ImplicitSolver {
             return self.respond_from_rest(context, input, problem, at, report);
         }
         // Held tissue beside a cut: the linear response of the intact body would tear at what is no longer there.
-        if problem.has_grasp() && !context.corrections.changed.is_empty() {
+        if problem.next.has_grasp() && !context.corrections.changed.is_empty() {
             return self.guess_freely(context, input, problem, at, report);
         }
         // The guess is made again in twice as many parts, with an iteration after each, until it does not halve the smallest det F.
         let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
-        let ways = problem.parts();
+        let ways = problem.ways.parts(&problem.work);
         let mut iterated = 1;
         loop {
             // Each attempt begins with the forces of the last step: they belong to `input.last`.
@@ -191,7 +191,7 @@ impl ImplicitSolver {
             let mut part = 0;
             while part < parts {
                 let last = part;
-                part = problem.next_part(part, parts);
+                part = problem.work.next_part(part, parts);
                 let way = part as f32 / parts as f32;
                 self.press(context, input, problem, way, at.u)?;
                 // An iteration after each of `iterated` parts of the load but the last.
@@ -303,7 +303,7 @@ pub(super) fn is_spent(
     report: &Report,
     iterations: u32,
 ) -> bool {
-    if !problem.may_lose() {
+    if !problem.ways.may_lose() {
         return false;
     }
     let most = input.enough.iterations + iterations * (EVALUATIONS - 1) + MORE_EVALUATIONS;
@@ -321,7 +321,7 @@ fn state<'a>(input: &Input<'a>, u: &'a [f32]) -> State<'a> {
 
 /// How deep tissue `u` and the tools lie in each other, at part `way` of their way, mm.
 fn sunk(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) -> f32 {
-    problem.sunk(state(input, u), way)
+    problem.depths().sunk(state(input, u), way)
 }
 
 /// How deep tools and tissue lie in each other in a state of linear elasticity; without bounds where that goes too far.

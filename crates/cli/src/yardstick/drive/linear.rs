@@ -63,10 +63,11 @@ impl Linear {
         }
         let contact_ms = started.elapsed().as_secs_f64() * 1e3;
         self.prior.step(&nodes, &vectors, out)?;
-        self.problem.finish(State {
+        let state = State {
             u: out.as_flattened(),
             ..state
-        });
+        };
+        self.problem.finish(state, true);
         self.problem.commit();
         self.problem
             .report(&mut self.told, &self.rest, out.as_flattened());

@@ -4,7 +4,6 @@ use ::contact::Vector;
 use ::contact::grasp::tension;
 
 use super::ContactProblem;
-use crate::contact::ToolUse;
 use crate::contact::past::Force;
 use crate::contact::state::{State, vector};
 use crate::contact::ties::NO_TOOL;
@@ -14,40 +13,28 @@ use crate::contact::tool::{ContactReport, Push, ToolReading};
 const STRONGEST_GRASP_MN: f32 = 10_000.0;
 
 impl ContactProblem {
-    /// Whether a grasp has torn off in this step.
-    pub fn tears(&self) -> bool {
-        self.next.tools.iter().any(|held| held.reading.torn)
-    }
-
     /// Nodes of the samples that push and of the ties, ascending, without held ones.
     pub fn reached(&mut self, held: &[bool]) -> &[u32] {
         self.gather_touched(held);
-        self.add_tied_nodes(held);
-        self.nodes.sort_unstable();
-        self.nodes.dedup();
-        &self.nodes
+        let of_step = (&self.ways, &self.next);
+        (self.tied).add_nodes(of_step, held, &mut self.prescribed.nodes);
+        self.prescribed.sorted()
     }
 
     /// Nodes of the samples that push, ascending, without held ones.
     pub fn touched(&mut self, held: &[bool]) -> &[u32] {
         self.gather_touched(held);
-        self.nodes.sort_unstable();
-        self.nodes.dedup();
-        &self.nodes
+        self.prescribed.sorted()
     }
 
     fn gather_touched(&mut self, held: &[bool]) {
-        self.nodes.clear();
-        for force in self
-            .next
-            .forces
-            .iter()
-            .filter(|force| force.tool != NO_TOOL)
-        {
-            let sample = self.samples.at(force.sample);
-            let nodes = sample.entries().map(|entry| entry.0);
-            self.nodes
-                .extend(nodes.filter(|node| !held[*node as usize]));
+        let nodes = &mut self.prescribed.nodes;
+        nodes.clear();
+        let forces = self.next.forces.iter();
+        for force in forces.filter(|force| force.tool != NO_TOOL) {
+            let sample = self.surface.samples.at(force.sample);
+            let own = sample.entries().map(|entry| entry.0);
+            nodes.extend(own.filter(|node| !held[*node as usize]));
         }
     }
 
@@ -62,7 +49,7 @@ impl ContactProblem {
     }
 
     fn each_nodal_force(&self, forces: &[Force], mut take: impl FnMut(u32, Vector)) {
-        let points = self.points();
+        let points = self.tied.points(&self.surface.samples);
         for force in forces {
             for (node, weight) in points.at(force.sample).entries() {
                 take(node, force.force * weight);
@@ -70,24 +57,22 @@ impl ContactProblem {
         }
     }
 
-    /// Sums up what each tool feels at `state`, the end of the step, and tears grasps that are pulled too hard.
-    pub fn finish(&mut self, state: State<'_>) {
-        self.finish_with(state, true);
-    }
-
-    /// The same; with `breaks` ties break that are pulled too hard.
-    pub fn finish_with(&mut self, state: State<'_>, breaks: bool) {
-        self.finish_ties(state, breaks);
-        for index in 0..self.tools.len() {
-            let penetration_mm = self.depth(index, state, 1.0);
-            let tool = &self.tools[index];
+    /// Sums up what each tool feels at `state`, the end of the step, and tears grasps that are pulled too hard; with `breaks` ties break
+    /// that are pulled too hard.
+    pub fn finish(&mut self, state: State<'_>, breaks: bool) {
+        self.tied.finish(&self.ways, &mut self.next, state, breaks);
+        for index in 0..self.ways.tools.len() {
+            let penetration_mm = self.depths().depth(index, state, 1.0);
+            let tool = &self.ways.tools[index];
             let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
             // What a grasp bears is the pull along the mean normal of its jaws: pressure holds it, tension tears it.
             let (mut pull, mut normal) = (Vector::ZERO, Vector::ZERO);
             let mut contacts = 0;
             let held = &self.next.tools[index];
             for row in self.next.forces.iter().filter(|f| f.tool == index as u32) {
-                let point = self.samples.at(row.sample).gather(|n| state.position(n));
+                let point = (self.surface.samples)
+                    .at(row.sample)
+                    .gather(|n| state.position(n));
                 // `row.force` is on the tissue, and the tool feels the opposite.
                 force -= row.force;
                 torque -= (point - tool.pose.translation).cross(row.force);
@@ -97,7 +82,7 @@ impl ContactProblem {
                     normal += tool.body.nearest_at(&tool.pose, point).normal;
                 }
             }
-            let (tied, turned) = self.pull_of_ties(index as u32);
+            let (tied, turned) = (self.tied).pull_on(index as u32, &self.ways, &self.next);
             force += tied;
             torque += turned;
             let held = &mut self.next.tools[index];
@@ -113,27 +98,12 @@ impl ContactProblem {
                 contacts,
                 penetration_mm,
                 torn,
-                residual_mm: if contacts > 0 { self.unsolved_mm } else { 0.0 },
+                residual_mm: match contacts {
+                    0 => 0.0,
+                    _ => self.solution.unsolved_mm,
+                },
             };
         }
-    }
-
-    /// Size, speed and number of the tools that push in this step, which takes `step_s`; a count of 0 where none pushes.
-    pub fn used(&self, step_s: f32) -> ToolUse {
-        let mut used = ToolUse {
-            size_mm: [f32::INFINITY, 0.0],
-            speed_mm_s: 0.0,
-            count: 0,
-        };
-        let each = self.tools.iter().zip(&self.before).zip(&self.next.tools);
-        for ((tool, from), _) in each.filter(|(_, held)| held.reading.contacts > 0) {
-            let size = tool.body.size();
-            used.size_mm = [used.size_mm[0].min(size), used.size_mm[1].max(size)];
-            let speed = tool.body.motion(from, &tool.pose) / step_s;
-            used.speed_mm_s = used.speed_mm_s.max(speed);
-            used.count += 1;
-        }
-        used
     }
 
     /// Makes the last step's readings and forces readable; displacements `[K,3]`, mm.
@@ -147,7 +117,7 @@ impl ContactProblem {
             .extend(self.past.ties.iter().map(|held| held.reading));
         let own = self.past.forces.iter();
         for force in own.filter(|force| force.tool != NO_TOOL) {
-            let sample = self.samples.at(force.sample);
+            let sample = self.surface.samples.at(force.sample);
             report.pushes.push(Push {
                 tool: force.tool,
                 point: sample

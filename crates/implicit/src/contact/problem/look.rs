@@ -1,48 +1,90 @@
 //! Where tools may touch: the samples near them and on their ways, those that are pushed, and those that are held.
 
-use ::contact::{Placed, SKIN_MM, SPACING_MM, Vector, pose};
+use ::contact::{Placed, SKIN_MM, SPACING_MM, Vector};
 
-use super::{ContactProblem, WHAT};
+use super::gauge::Gauge;
+use super::surface::Surface;
+use super::tie_set::TieSet;
+use super::ways::ToolWays;
 use crate::contact::buried::Buried;
-use crate::contact::rows::{Moving, Pair, Row, outward};
+use crate::contact::past::Past;
+use crate::contact::rows::WHAT;
+use crate::contact::rows::{Pair, Row, outward};
 use crate::contact::state::State;
 use crate::contact::ties::NO_TOOL;
 use crate::contact::tool::MAX_TOOLS;
 use crate::error::Result;
-use crate::memory;
+use crate::memory::{self, HeldBytes};
 
-pub(super) use crate::contact::rows::MOST_ROWS;
+use crate::contact::rows::MOST_ROWS;
 
-impl ContactProblem {
-    /// Fills `rows`: samples near the tools at part `part` of their way, those that are pushed, and those that are held; at the end of the
-    /// way also those that the tools have passed; `most` rows at most, and those of ties. `wide` takes all that the tools may reach as they move.
+/// How a problem looks for rows.
+#[derive(Clone, Copy)]
+pub struct Look {
+    /// The part of the tools' ways that they have gone.
+    pub part: f32,
+    /// All that the tools may reach as they move.
+    pub wide: bool,
+    /// Rows at most, and those of ties.
+    pub most: usize,
+}
+
+/// The rows of a problem.
+#[derive(HeldBytes)]
+pub struct NearRows {
+    /// What the last look found, ascending by tool and sample, then the ties.
+    pub rows: Vec<Row>,
+    /// Rows that a solve had no room for: their forces go.
+    pub shed: Vec<Row>,
+    /// Samples that the last look found.
+    pub found: usize,
+}
+
+impl NearRows {
+    /// Room for the rows of two solves.
+    pub fn new() -> Result<NearRows> {
+        Ok(NearRows {
+            rows: memory::room(2 * MOST_ROWS, WHAT)?,
+            shed: memory::room(2 * MOST_ROWS, WHAT)?,
+            found: 0,
+        })
+    }
+
+    /// Fills the rows: samples near the tools, those that are pushed, and those that are held; at the end of the
+    /// way also those that the tools have passed; and those of ties. A thin tool that has pierced the surface since comes out where it did.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub(super) fn look(
+    pub fn look(
         &mut self,
+        surface: &mut Surface,
+        ways: &mut ToolWays,
+        (tied, next): (&TieSet, &Past),
         state: State<'_>,
-        part: f32,
-        wide: bool,
-        most: usize,
+        look: Look,
     ) -> Result<()> {
-        let mut placed: [Option<Placed>; MAX_TOOLS] = [const { None }; MAX_TOOLS];
-        for (index, (tool, from)) in self.tools.iter().zip(&self.before).enumerate() {
+        let Look { part, wide, most } = look;
+        for index in 0..ways.tools.len() {
             // A tip finer than the spacing of the samples goes in between them: it is looked for as a point.
-            if tool.body.sinks_between(SPACING_MM) {
-                let at = pose::between(from, &tool.pose, part);
-                let tip = Buried::tip(&tool.body, &at, &self.samples, state);
-                self.buried[index] = tip.or(self.buried[index]);
+            let body = &ways.tools[index].body;
+            if body.sinks_between(SPACING_MM) {
+                let at = ways.pose(index, part);
+                let tip = Buried::tip(body, &at, &surface.samples, state);
+                ways.buried[index] = tip.or(ways.buried[index]);
             }
+        }
+        let ways = &*ways;
+        let mut placed: [Option<Placed>; MAX_TOOLS] = [const { None }; MAX_TOOLS];
+        for (index, (tool, from)) in ways.tools.iter().zip(&ways.before).enumerate() {
             // At the end of the way samples that the tool has passed are behind it, as far as it came.
             let motion = match wide || part >= 1.0 {
                 true => tool.body.motion(from, &tool.pose),
                 false => 0.0,
             };
-            let depth = self.buried[index].map_or(0.0, |buried| buried.depth);
+            let depth = ways.buried[index].map_or(0.0, |buried| buried.depth);
             placed[index] = Some(Placed {
                 body: &tool.body,
-                pose: pose::between(from, &tool.pose, part),
+                pose: ways.pose(index, part),
                 skin: SKIN_MM + motion.max(depth),
             });
         }
@@ -59,27 +101,27 @@ impl ContactProblem {
             point: Vector::ZERO,
             outward: Vector::ZERO,
         };
+        let Surface {
+            samples, search, ..
+        } = surface;
         for (index, placed) in placed.iter().flatten().enumerate() {
-            let found = self
-                .search
-                .find(&self.samples, std::slice::from_ref(placed), |node| {
-                    state.position(node)
-                });
+            let found = search.find(samples, std::slice::from_ref(placed), |node| {
+                state.position(node)
+            });
             let tool = index as u32;
             self.found += found.len();
-            let anchors = self.next.tools[index].grasp.anchors();
+            let anchors = next.tools[index].grasp.anchors();
             memory::reserve(&mut self.rows, found.len() + anchors.len() + 1, WHAT)?;
             let pair = Pair {
                 body: placed.body,
                 friction: 0.0,
-                from: &self.before[index],
+                from: &ways.before[index],
                 now: &placed.pose,
                 anchor: None,
-                put: self.put[index],
-                swept: self.swept[index],
-                way_out: self.buried[index].map(|buried| buried.out),
+                put: ways.put[index],
+                swept: ways.swept[index],
+                way_out: ways.buried[index].map(|buried| buried.out),
             };
-            let samples = &self.samples;
             let found = found.iter().filter(|found| {
                 let start = || {
                     samples
@@ -92,16 +134,12 @@ impl ContactProblem {
             self.rows
                 .extend(found.map(|c| row(tool, c.sample, Vector::ZERO, c.distance > SKIN_MM)));
             let own = anchors.iter().map(|anchor| anchor.sample);
-            let own = own.chain(self.buried[index].map(|buried| buried.row));
+            let own = own.chain(ways.buried[index].map(|buried| buried.row));
             self.rows
                 .extend(own.map(|sample| row(tool, sample, Vector::ZERO, false)));
         }
-        memory::reserve(&mut self.rows, self.next.forces.len(), WHAT)?;
-        let pushed = self
-            .next
-            .forces
-            .iter()
-            .filter(|force| force.tool != NO_TOOL);
+        memory::reserve(&mut self.rows, next.forces.len(), WHAT)?;
+        let pushed = next.forces.iter().filter(|force| force.tool != NO_TOOL);
         self.rows
             .extend(pushed.map(|force| row(force.tool, force.sample, force.force, false)));
         // Those with a force come first of their equals, and stay; then those that are held.
@@ -109,61 +147,47 @@ impl ContactProblem {
             .sort_unstable_by_key(|row| (row.tool, row.sample, row.force == Vector::ZERO, row.far));
         self.rows.dedup_by_key(|row| (row.tool, row.sample));
         for row in &mut self.rows {
-            let sample = self.samples.at(row.sample);
+            let sample = samples.at(row.sample);
             row.point = sample.gather(|node| state.position(node));
-            row.outward = outward(&self.samples, row.sample, state);
+            row.outward = outward(samples, row.sample, state);
         }
+        let gauge = Gauge {
+            samples,
+            ways,
+            tied,
+            next,
+        };
         if !wide && self.rows.iter().any(|row| row.far) {
-            let mut rows = std::mem::take(&mut self.rows);
-            let moving = self.moving(state, part);
-            rows.retain(|row| !row.far || moving.contact(row, part).gap <= SKIN_MM);
-            self.rows = rows;
+            let moving = gauge.moving(state, part);
+            self.rows
+                .retain(|row| !row.far || moving.contact(row, part).gap <= SKIN_MM);
         }
         if self.rows.len() > most {
             memory::fit(&mut self.shed, self.rows.len() - most, WHAT)?;
-            self.keep_deepest(state, part, most);
+            self.keep_deepest(gauge, state, part, most);
         }
-        self.look_at_ties(state)
-    }
-
-    /// The tools at part `part` of their way.
-    pub(super) fn moving<'a>(&'a self, state: State<'a>, part: f32) -> Moving<'a> {
-        Moving {
-            tools: &self.tools,
-            before: &self.before,
-            put: &self.put,
-            swept: &self.swept,
-            buried: &self.buried,
-            held: &self.next.tools,
-            samples: &self.samples,
-            state,
-            part,
-            pulling: self.pulling(),
-        }
+        tied.add_rows((ways, next), state, &mut self.rows)
     }
 
     /// Keeps `most` rows: those with a force first, then those deepest inside of their tool. Where they are fewer than [`MOST_ROWS`] those at nodes
     /// come first instead, which hold the tissue between them too, and forces of the others are shed.
-    fn keep_deepest(&mut self, state: State<'_>, part: f32, most: usize) {
-        let mut rows = std::mem::take(&mut self.rows);
-        let mut shed_rows = std::mem::take(&mut self.shed);
-        let moving = self.moving(state, part);
-        let samples = &self.samples;
-        for row in &mut rows {
+    fn keep_deepest(&mut self, gauge: Gauge<'_>, state: State<'_>, part: f32, most: usize) {
+        let moving = gauge.moving(state, part);
+        for row in &mut self.rows {
             row.gap = moving.contact(row, part).gap;
         }
-        rows.sort_unstable_by(|a, b| {
+        self.rows.sort_unstable_by(|a, b| {
             let late = |row: &Row| match most < MOST_ROWS {
-                true => samples.at(row.sample).entries().count() > 1 || row.gap > SKIN_MM,
+                true => gauge.samples.at(row.sample).entries().count() > 1 || row.gap > SKIN_MM,
                 false => row.force == Vector::ZERO,
             };
             let order = late(a).cmp(&late(b)).then(a.gap.total_cmp(&b.gap));
             order.then(a.sample.cmp(&b.sample))
         });
-        let shed = rows[most..].iter();
-        shed_rows.extend(shed.filter(|row| row.force != Vector::ZERO));
-        rows.truncate(most);
-        rows.sort_unstable_by_key(|row| (row.tool, row.sample));
-        (self.rows, self.shed) = (rows, shed_rows);
+        let shed = self.rows[most..].iter();
+        self.shed
+            .extend(shed.filter(|row| row.force != Vector::ZERO));
+        self.rows.truncate(most);
+        self.rows.sort_unstable_by_key(|row| (row.tool, row.sample));
     }
 }

@@ -16,6 +16,10 @@ const LONGEST_SOLVES_WORK: u64 = 3 * SOLVES_WORK;
 /// What is left when solves begin to take fewer samples.
 const SHORT_OF_WORK: u64 = SOLVES_WORK / 2;
 
+/// Parts of the tools' ways in a step that has taken its work, or its time.
+const LEAST_PARTS: u32 = 4;
+const LATE_PARTS: u32 = 2;
+
 /// What is left to the step being made.
 #[derive(Debug, HeldBytes)]
 pub struct Work {
@@ -95,5 +99,23 @@ impl Work {
     /// Whether the solves of this step have taken their work or time.
     pub fn is_spent(&self) -> bool {
         self.solves == 0 || self.is_late()
+    }
+
+    /// The part of `parts` of the tools' ways to take after part `part`: the next, or one of `LEAST_PARTS` once the solves have taken their time.
+    pub fn next_part(&self, part: u32, parts: u32) -> u32 {
+        let stride = match self.is_spent() {
+            true => parts.div_ceil(self.least_parts()),
+            false => 1,
+        };
+        (part + stride).min(parts)
+    }
+
+    /// Parts of the tools' ways where there is little work or time left.
+    pub(super) fn least_parts(&self) -> u32 {
+        if self.is_late() {
+            LATE_PARTS
+        } else {
+            LEAST_PARTS
+        }
     }
 }

@@ -58,7 +58,7 @@ impl LocalSolver {
                     self.det = det;
                     // The forces were solved for at the whole direction.
                     if t < 1.0 {
-                        problem.blend(t);
+                        problem.kept.blend(&mut problem.next, t);
                     }
                     return Ok(Gain {
                         is_better: true,
@@ -69,7 +69,7 @@ impl LocalSolver {
                 Tried::GivenUp => {
                     self.place_at(base, 0.0);
                     // Back to the forces and the state before; pairs and factor have led astray, and are forgotten.
-                    problem.undo();
+                    problem.kept.undo(&mut problem.next);
                     self.pairs.clear();
                     self.factor.clear();
                     return Ok(Gain::default());

@@ -23,8 +23,8 @@ impl ImplicitSolver {
         let found_sound = at.det >= SMALLEST_DET;
         // `d` is scratch here: no direction is asked for any more.
         self.d.copy_from_slice(at.u);
-        problem.keep_sound()?;
-        problem.take_guess();
+        problem.kept.keep_sound(&problem.next)?;
+        problem.kept.take_guess(&mut problem.next);
         at.u.copy_from_slice(&self.guess);
         let mut left = self.press_on(context, input, problem, SUNK_MM, at.u)?;
         self.keep(problem, at)?;
@@ -32,7 +32,7 @@ impl ImplicitSolver {
             self.respond_from_rest(context, input, problem, at, report)?;
             let from_rest = self.press_on(context, input, problem, SUNK_MM, at.u)?;
             // No force at all: the tool lies where samples cannot see it, and the tissue is where no tool pushed it.
-            let is_lost = problem.tools_pushed() && !problem.tools_push();
+            let is_lost = problem.past.tools_push() && !problem.next.tools_push();
             if from_rest < left && !is_lost {
                 left = from_rest;
                 self.keep(problem, at)?;
@@ -45,7 +45,7 @@ impl ImplicitSolver {
                 return self.stay(context, input, problem, at, report);
             }
         }
-        problem.take_guess();
+        problem.kept.take_guess(&mut problem.next);
         at.u.copy_from_slice(&self.guess);
         self.evaluate(context, input, at, report)?;
         // What a linear response turns inside out is no tissue: a tool that has lost the contact there pushes its way in from a sound state, in the steps that
@@ -57,7 +57,7 @@ impl ImplicitSolver {
             return Ok(());
         }
         if found_sound {
-            problem.take_sound();
+            problem.kept.take_sound(&mut problem.next);
             at.u.copy_from_slice(&self.d);
             self.evaluate(context, input, at, report)?;
         } else if !input.still {
@@ -66,7 +66,7 @@ impl ImplicitSolver {
         if at.det > found {
             return Ok(());
         }
-        problem.take_guess();
+        problem.kept.take_guess(&mut problem.next);
         at.u.copy_from_slice(&self.guess);
         self.evaluate(context, input, at, report)
     }
@@ -74,7 +74,7 @@ impl ImplicitSolver {
     /// What stands if nothing better is found.
     fn keep(&mut self, problem: &mut ContactProblem, at: &Iterate<'_>) -> Result<()> {
         self.guess.copy_from_slice(at.u);
-        problem.keep_guess()
+        problem.kept.keep_guess(&problem.next)
     }
 
     /// Linear elasticity from rest, with the tools where they are.
@@ -95,14 +95,14 @@ impl ImplicitSolver {
             last: &[],
             ..*input
         };
-        let parts = problem.parts();
+        let parts = problem.ways.parts(&problem.work);
         let mut part = 0;
         while part < parts {
-            part = problem.next_part(part, parts);
+            part = problem.work.next_part(part, parts);
             let way = part as f32 / parts as f32;
             self.press(context, &from_rest, problem, way, at.u)?;
         }
-        problem.return_to_ways();
+        problem.ways.return_to();
         self.settle(context.env(), at.u)?;
         report.parts = parts;
         self.evaluate(context, input, at, report)

@@ -23,7 +23,7 @@ impl ImplicitSolver {
         problem: &ContactProblem,
     ) -> bool {
         let is_moved = input.load.is_some() || !context.corrections.groups.is_empty();
-        is_moved || problem.has_ties()
+        is_moved || problem.tied.has_any()
     }
 
     /// Iterates from the last state, or where that has inverted elements, too, from a part of the way from rest to the guess; returns the length of what is left
@@ -51,7 +51,7 @@ impl ImplicitSolver {
         } else {
             // What the last state and this one make of a velocity is none.
             report.fell_back = true;
-            problem.take_guess();
+            problem.kept.take_guess(&mut problem.next);
             at.u.copy_from_slice(&self.guess);
             self.d.fill(0.0);
             let mut rest = std::mem::take(&mut self.d);
@@ -59,7 +59,7 @@ impl ImplicitSolver {
             self.d = rest;
             lifted?;
             for _ in 0..HALVES {
-                problem.scale_forces(0.5);
+                problem.next.scale_forces(0.5);
                 let pairs = at.u.iter_mut().zip(&self.d);
                 pairs.for_each(|(u, rest)| *u = 0.5 * (*u + rest));
                 self.evaluate(context, input, at, report)?;

@@ -37,25 +37,25 @@ impl ImplicitSolver {
         let _awake = context.pool.keep_awake();
         let mut report = self.make_once(context, input, problem, next, from_published, true)?;
         // Tools that no single step follows stop on their way, at last where they were; beside one that was put elsewhere they do so at once.
-        let first = usize::from(problem.has_leapt());
+        let first = usize::from(problem.ways.has_leapt);
         for thicknesses in &STOPS[first..] {
-            if !problem.has_passed(report.fell_back) {
+            if !(problem.ways).has_passed(&problem.past, &problem.next, report.fell_back) {
                 break;
             }
-            problem.stop_after(*thicknesses);
+            (problem.ways).stop_after(&problem.past, &mut problem.next, *thicknesses);
             problem.work.renew();
             report = self.make_once(context, input, problem, next, from_published, true)?;
         }
-        if problem.tears() {
+        if problem.next.tears() {
             report = self.make_once(context, input, problem, next, from_published, true)?;
         }
         // Each time those break that bear least of what they are pulled with.
         let mut left = MOST_BREAKS;
-        while problem.has_broken() {
+        while problem.tied.broke {
             left -= 1;
             report = self.make_once(context, input, problem, next, from_published, left > 0)?;
         }
-        problem.tell_lag();
+        problem.ways.tell_lag(&mut problem.next);
         Ok(report)
     }
 
@@ -73,7 +73,7 @@ impl ImplicitSolver {
             self.begin_pairs();
         }
         let report = self.balance_loaded(context, input, problem, next)?;
-        problem.finish_with(state(input, next), breaks);
+        problem.finish(state(input, next), breaks);
         Ok(report)
     }
 }

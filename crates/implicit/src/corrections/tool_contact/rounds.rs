@@ -60,7 +60,7 @@ impl ImplicitSolver {
             self.end_round(context, input, problem, at, report)?;
             let most = input.enough.iterations;
             // A tool that was put elsewhere comes out of the tissue over a few steps: none of them is worth another base.
-            let is_last = made.iterations >= most || problem.has_leapt();
+            let is_last = made.iterations >= most || problem.ways.has_leapt;
             if made.is_enough || is_last || problem.work.is_spent() {
                 break;
             }
@@ -74,7 +74,7 @@ impl ImplicitSolver {
         if let Some(local) = &self.local {
             report.far_mm = local.far_mm;
             // What a leap does to the far nodes says nothing of the reach.
-            if !problem.has_leapt() {
+            if !problem.ways.has_leapt {
                 report.level = local.next_level(at.u);
             }
         }
