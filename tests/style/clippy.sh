@@ -17,7 +17,7 @@ alone() {
 lint --workspace
 alone libupt "" instruments learned
 alone tissue "" files linear
-alone upt-cli "" files # the first is the demo's
+alone upt-cli "" # the demo's
 alone upt-study ""
 if compgen -G "$(rustc --print target-libdir --target wasm32-unknown-unknown)/libstd-*" >/dev/null; then
   check "clippy for WebAssembly" cargo clippy --release --package libupt --lib --target wasm32-unknown-unknown --no-default-features \

@@ -20,7 +20,7 @@ NOT_OURS = {
     "web/src/abi.js": "written by `cargo xtask header`",
     "python/upt/_native.py": "written by `cargo xtask header`",
     "unity-plugin/Runtime/Interop/Native.g.cs": "written by `cargo xtask header`",
-    "crates/cli/src/view/page/three.js": "three.js, vendored",
+    "crates/page/src/three.js": "three.js, vendored",
 }
 
 # Path: lines at most, and why it is one file.

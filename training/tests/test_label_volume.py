@@ -154,7 +154,7 @@ def test_a_volume_of_a_scan_is_cropped_and_one_that_unpacks_to_a_gigabyte_is_ref
     def convert(name: str) -> subprocess.CompletedProcess[str]:
         command = [
             sys.executable,
-            str(ROOT / "crates/cli/src/foreign.py"),
+            str(ROOT / "crates/foreign/src/labels.py"),
             str(tmp_path / name),
             str(tmp_path / "out.ply"),
         ]

@@ -15,6 +15,8 @@ use crate::{archive, venv};
 
 const TARGET: &str = "wasm32-unknown-unknown";
 const VIEW: &str = "crates/cli/src/view/page";
+/// What that page takes from beside it.
+const THREE: [&str; 2] = ["three.js", "three.LICENSE"];
 
 /// An organ of the site.
 struct Organ {
@@ -121,7 +123,12 @@ pub fn site(workspace: &Workspace, out: &Path) -> Result<bool> {
 fn write_site(workspace: &Workspace, wasm: &Path, organs: &[Organ], out: &Path) -> Result<()> {
     std::fs::remove_dir_all(out).ok();
     copy(&workspace.path(VIEW), out)?;
-    std::fs::remove_file(out.join("vendor.sh"))?;
+    for name in THREE {
+        copy(
+            &workspace.path("crates/page/src").join(name),
+            &out.join(name),
+        )?;
+    }
     copy(&workspace.path("web/site"), out)?;
     copy(&workspace.path("web/src"), &out.join("libupt"))?;
     for name in ["NOTICE", "LICENSE-APACHE", "LICENSE-MIT"] {

@@ -2,9 +2,9 @@
 
 use crate::counted::counted;
 use crate::simulate::SolverArguments;
-use crate::{loads, tool_scale};
+use crate::{loads, tool_size};
 use anyhow::{Context, Result, bail};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,6 +13,7 @@ use tissue::mesh::{Boundary, Mesh};
 use tissue::programmes::{ToolProgramme, ToolScale};
 use tissue::schemes::{FRAME_S, Scheme};
 use tissue::solver::SolverOptions;
+use yardstick::tool_scale::Chosen;
 
 #[derive(clap::Args)]
 #[command(
@@ -30,7 +31,7 @@ pub struct Options {
     #[arg(long, help = loads::programmes_help(), value_parser = ToolProgramme::parse_list)]
     tools: Option<std::vec::Vec<ToolProgramme>>,
     #[command(flatten)]
-    sizes: tool_scale::Arguments,
+    sizes: tool_size::Arguments,
     /// Number of cases over all shards.
     #[arg(long)]
     count: usize,
@@ -111,7 +112,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let mesh = Mesh::read(&options.mesh)?;
     let tool_scale = match &options.tools {
         Some(_) => {
-            let sizes = tool_scale::Chosen::of(options.sizes, &mesh, None);
+            let sizes = Chosen::of(options.sizes.tool_scale, &mesh, None);
             eprintln!("{}", sizes.words());
             sizes.scale
         }
@@ -198,34 +199,4 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         counted(manifest.cases.len(), "case")
     );
     Ok(ExitCode::SUCCESS)
-}
-
-/// Finished cases of a split of a dataset, the first `per_scheme` of each scheme.
-pub fn finished(folder: &Path, split: &str, per_scheme: usize) -> Result<Vec<PathBuf>> {
-    let file = folder.join("manifest.json");
-    let text = std::fs::read(&file).with_context(|| {
-        format!(
-            "{}: cannot be read; `upt dataset` writes it",
-            file.display()
-        )
-    })?;
-    let manifest: serde_json::Value = serde_json::from_slice(&text)
-        .with_context(|| format!("{}: is not JSON", file.display()))?;
-    let cases = manifest["cases"]
-        .as_array()
-        .with_context(|| format!("{}: field `cases` is missing", file.display()))?;
-    let mut taken: std::collections::BTreeMap<String, usize> = std::collections::BTreeMap::new();
-    let mut paths = Vec::new();
-    for case in cases {
-        let text = |field: &str| case[field].as_str().unwrap_or("").to_owned();
-        if text("split") != split || text("status") != "done" {
-            continue;
-        }
-        let count = taken.entry(text("scheme")).or_default();
-        if *count < per_scheme {
-            *count += 1;
-            paths.push(folder.join(text("file")));
-        }
-    }
-    Ok(paths)
 }

@@ -164,9 +164,9 @@ fn runtime() -> (Runtime, serde_json::Value) {
 fn cpu() -> Cpu {
     Cpu {
         architecture: std::env::consts::ARCH,
-        name: crate::machine::cpu_name(),
+        name: yardstick::machine::cpu_name(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
-        features: crate::machine::cpu_features(),
+        features: yardstick::machine::cpu_features(),
         kernels: format!("{:?}", upt::kernels::Isa::detect()).to_lowercase(),
     }
 }
@@ -179,7 +179,7 @@ fn open(path: &Path) -> Bundle {
         .and_then(|bytes| serde_json::from_slice(bytes).ok())
         .unwrap_or_default();
     let text = |field: &str| fields[field].as_str().map(str::to_owned);
-    let opened = crate::host::Model::open(path, &crate::host::ModelSettings::default());
+    let opened = host::Model::open(path, &host::ModelSettings::default());
     Bundle {
         path: path.display().to_string(),
         name: text("name"),

@@ -5,7 +5,6 @@
 //! input, with a message on stderr that says what to do.
 
 pub mod bundle;
-pub mod bundle_folder;
 #[cfg(feature = "linear")]
 pub mod check;
 #[cfg(feature = "linear")]
@@ -13,49 +12,35 @@ pub mod corrections;
 pub mod counted;
 pub mod dataset;
 pub mod doctor;
-pub mod effort;
-pub mod errors;
-#[cfg(feature = "files")]
+#[cfg(feature = "linear")]
+mod emit;
+#[cfg(feature = "linear")]
 pub mod export;
 pub mod fit;
-#[cfg(feature = "files")]
-mod foreign;
-pub mod host;
 #[cfg(not(feature = "linear"))]
 pub mod left_out;
 pub mod loads;
-pub mod machine;
 #[cfg(feature = "linear")]
 pub mod make;
-pub mod manifest;
 pub mod marks;
 pub mod materials;
 pub mod mesh;
 #[cfg(feature = "linear")]
 pub mod modes;
-#[cfg(feature = "linear")]
-mod parallel;
+pub mod one_of;
 pub mod plot;
-pub mod preview;
 #[cfg(feature = "linear")]
 pub mod prior;
 pub mod progress;
-mod python;
-#[cfg(feature = "files")]
-mod regions;
 pub mod render;
 pub mod replay;
 pub mod rollout;
 pub mod runtime;
-pub mod setting;
 pub mod simulate;
-pub mod surrogate;
-mod three;
-pub mod tool_scale;
+mod tool_size;
 #[cfg(feature = "linear")]
 pub mod validate;
 pub mod view;
-pub mod yardstick;
 
 // For their features alone: see Cargo.toml.
 use bitflags as _;

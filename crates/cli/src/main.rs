@@ -6,21 +6,18 @@ mod reference;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-#[cfg(feature = "files")]
-use upt_cli::export;
 #[cfg(not(feature = "linear"))]
 use upt_cli::left_out;
 use upt_cli::{
     bundle, dataset, doctor, fit, loads, materials, mesh, replay, rollout, runtime, simulate, view,
 };
 #[cfg(feature = "linear")]
-use upt_cli::{check, corrections, make, modes, prior, validate};
+use upt_cli::{check, corrections, export, make, modes, prior, validate};
 
 /// Names what a build leaves out; `cargo xtask demo` builds without what it does not need.
-const VERSION: &str = match (cfg!(feature = "files"), cfg!(feature = "linear")) {
-    (true, true) => env!("CARGO_PKG_VERSION"),
-    (true, false) => concat!(env!("CARGO_PKG_VERSION"), " (without linear)"),
-    (false, _) => concat!(env!("CARGO_PKG_VERSION"), " (without files, linear)"),
+const VERSION: &str = match cfg!(feature = "linear") {
+    true => env!("CARGO_PKG_VERSION"),
+    false => concat!(env!("CARGO_PKG_VERSION"), " (without linear)"),
 };
 
 macro_rules! explained {
@@ -30,7 +27,7 @@ macro_rules! explained {
 }
 
 /// Says first what a build is that leaves something out.
-const AFTER: &str = match cfg!(all(feature = "files", feature = "linear")) {
+const AFTER: &str = match cfg!(feature = "linear") {
     true => explained!(),
     false => concat!(
         "This is the small `upt` that `cargo xtask demo` builds: it shows and measures bundles, and makes none. The whole command: \
@@ -75,10 +72,10 @@ enum Command {
     /// Inspect, import and fill meshes.
     Mesh(mesh::Options),
     /// Write a trajectory for ParaView, or one frame's surface as PLY or glTF.
-    #[cfg(feature = "files")]
+    #[cfg(feature = "linear")]
     Export(export::Options),
     /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
-    #[cfg(not(feature = "files"))]
+    #[cfg(not(feature = "linear"))]
     Export(left_out::Options),
     /// Compute the linear-elastic compliance columns of a mesh, from which priors and reduced bundles are made.
     #[cfg(feature = "linear")]
@@ -144,10 +141,10 @@ fn main() -> ExitCode {
         Command::Bundle(options) => bundle::run(&options),
         Command::Runtime(options) => runtime::run(&options),
         Command::Mesh(options) => mesh::run(&options),
-        #[cfg(feature = "files")]
+        #[cfg(feature = "linear")]
         Command::Export(options) => export::run(&options),
-        #[cfg(not(feature = "files"))]
-        Command::Export(options) => left_out::run("files", &options),
+        #[cfg(not(feature = "linear"))]
+        Command::Export(options) => left_out::run("linear", &options),
         #[cfg(feature = "linear")]
         Command::Prior(options) => prior::run(&options),
         #[cfg(not(feature = "linear"))]

@@ -1,9 +1,9 @@
 //! `upt mesh`: what a mesh is (`info`); `import` and `stuff` are in `mesh/files.rs`.
 
-#[cfg(feature = "files")]
+#[cfg(feature = "linear")]
 mod files;
 mod quality;
-#[cfg(feature = "files")]
+#[cfg(feature = "linear")]
 mod sets;
 
 use clap::{Args, Subcommand};
@@ -15,7 +15,7 @@ use tissue::mesh::{Boundary, Mesh};
 use tissue::mesh_quality::measure;
 use tissue::solver::{Solver, SolverOptions};
 
-#[cfg(feature = "files")]
+#[cfg(feature = "linear")]
 use files::{Import, Stuff, run_import, run_stuff};
 use quality::print_quality;
 
@@ -30,17 +30,17 @@ pub struct Options {
 enum Command {
     /// Print counts, quality, manifoldness and the critical time step of a mesh.
     Info(Info),
-    #[cfg(feature = "files")]
+    #[cfg(feature = "linear")]
     /// Import tetrahedra (VTK, Gmsh, Abaqus, FEBio, Medit, TetGen) or fill a closed surface (STL, OBJ, PLY, OFF, VTK).
     Import(Import),
-    #[cfg(feature = "files")]
+    #[cfg(feature = "linear")]
     /// Fill a signed distance grid with tetrahedra; `python -m upt_training.anatomy` calls this.
     Stuff(Stuff),
     /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
-    #[cfg(not(feature = "files"))]
+    #[cfg(not(feature = "linear"))]
     Import(crate::left_out::Options),
     /// Left out of this small `upt`; `cargo build --release -p upt-cli` builds the whole.
-    #[cfg(not(feature = "files"))]
+    #[cfg(not(feature = "linear"))]
     Stuff(crate::left_out::Options),
 }
 
@@ -73,13 +73,13 @@ struct Info {
 pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     match &options.command {
         Command::Info(info) => run_info(info),
-        #[cfg(feature = "files")]
+        #[cfg(feature = "linear")]
         Command::Import(import) => run_import(import),
-        #[cfg(feature = "files")]
+        #[cfg(feature = "linear")]
         Command::Stuff(stuff) => run_stuff(stuff),
-        #[cfg(not(feature = "files"))]
+        #[cfg(not(feature = "linear"))]
         Command::Import(options) | Command::Stuff(options) => {
-            crate::left_out::run("files", options)
+            crate::left_out::run("linear", options)
         }
     }
 }

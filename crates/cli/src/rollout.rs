@@ -5,16 +5,17 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 use clap::Args;
+use host::Effort;
 use serde_json::json;
 use tissue::mesh::Mesh;
 use tissue::trajectory::Trajectory;
+use yardstick::bundle_folder::BundleFolder;
+use yardstick::errors::{CaseErrors, step_errors};
+use yardstick::setting::{Precision, Provider, Region};
+use yardstick::surrogate::{self, Surrogate};
 
-use crate::bundle_folder::BundleFolder;
-use crate::effort::Effort;
-use crate::errors::{CaseErrors, step_errors};
+use crate::one_of::one_of;
 use crate::render::{Image, Palette, contact_camera, deformed, lengths};
-use crate::setting::{Precision, Provider, Region};
-use crate::surrogate::{self, Surrogate};
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -29,9 +30,9 @@ pub struct Options {
     /// Threads of a step.
     #[arg(long, default_value_t = 1)]
     threads: u32,
-    #[arg(long, default_value = "f32")]
+    #[arg(long, default_value = "f32", value_parser = one_of(&Precision::ALL, Precision::name))]
     precision: Precision,
-    #[arg(long, default_value = "cpu")]
+    #[arg(long, default_value = "cpu", value_parser = one_of(&Provider::ALL, Provider::name))]
     provider: Provider,
     /// Write a VTU file per frame, with prediction, truth and error, and a PVD file that lists them.
     #[arg(long, value_name = "FOLDER")]

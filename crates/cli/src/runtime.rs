@@ -9,8 +9,8 @@ use std::process::{Command, ExitCode};
 use anyhow::{Context, Result};
 use ort_wheel::{Platform, VERSION};
 
-use crate::host::NoRuntime;
-use crate::python;
+use foreign::python;
+use host::NoRuntime;
 
 const VARIABLE: &str = "ORT_DYLIB_PATH";
 

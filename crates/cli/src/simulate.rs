@@ -1,6 +1,6 @@
 //! `upt simulate`: one case of a scheme, of tools or of loads on a mesh, as a trajectory file.
 
-use crate::{loads, materials, tool_scale};
+use crate::{loads, materials, tool_size};
 use anyhow::Context;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -10,6 +10,7 @@ use tissue::programmes::ToolProgramme;
 use tissue::schemes::{FRAMES, Scheme};
 use tissue::simulate::{ToolOrder, simulate_loads, simulate_tools};
 use tissue::solver::{Pressure, SolverOptions};
+use yardstick::tool_scale::Chosen;
 
 #[derive(clap::Args)]
 #[command(
@@ -32,11 +33,11 @@ pub struct Options {
     #[command(flatten)]
     load_sizes: LoadArguments,
     /// STL, OBJ or PLY file whose convex hull replaces the programme's tool (mm; y up the shaft, the lowest end touches).
-    #[cfg(feature = "files")]
+    #[cfg(feature = "linear")]
     #[arg(long, requires = "tool")]
     tool_shape: Option<PathBuf>,
     #[command(flatten)]
-    sizes: tool_scale::Arguments,
+    sizes: tool_size::Arguments,
     /// Seed of the contact site.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -58,7 +59,7 @@ pub struct Options {
 
 impl Options {
     /// A tool of the user's own.
-    #[cfg(feature = "files")]
+    #[cfg(feature = "linear")]
     fn own_shape(&self) -> anyhow::Result<Option<contact::Shape>> {
         let file = self.tool_shape.as_deref();
         Ok(file
@@ -66,8 +67,8 @@ impl Options {
             .transpose()?)
     }
 
-    /// Reading one takes the feature `files`.
-    #[cfg(not(feature = "files"))]
+    /// Reading one takes the feature `linear`.
+    #[cfg(not(feature = "linear"))]
     fn own_shape(&self) -> anyhow::Result<Option<contact::Shape>> {
         Ok(None)
     }
@@ -177,7 +178,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         }
         (None, Some(tool), _) => {
             let own = options.own_shape()?;
-            let sizes = tool_scale::Chosen::of(options.sizes, &mesh, None);
+            let sizes = Chosen::of(options.sizes.tool_scale, &mesh, None);
             bar.suspend(|| eprintln!("{}", sizes.words()));
             let order = ToolOrder {
                 own: own.as_ref(),

@@ -13,9 +13,9 @@ use upt::{Corrections, Error, Model, ModelOptions, Scene, SceneOptions, StepInpu
 
 use crate::report::options::Options;
 use crate::table::{Column, Table};
-use upt_cli::bundle_folder::BundleFolder;
-use upt_cli::effort::Effort;
+use host::Effort;
 use upt_cli::marks::replace_between;
+use yardstick::bundle_folder::BundleFolder;
 
 /// A bundle, its mesh, and the corrections that are asked for.
 pub struct Subject {

@@ -16,7 +16,7 @@ use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
 use crate::quantile::median;
 use crate::report::options::Options;
 use crate::table::Column;
-use upt_cli::effort::Effort;
+use host::Effort;
 
 /// A case of the reference solver: by frame the force of each tie (mN), the field, and when each broke.
 struct Truth {

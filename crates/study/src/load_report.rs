@@ -17,8 +17,8 @@ use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
 use crate::quantile::median;
 use crate::report::options::Options;
 use crate::table::Column;
-use upt_cli::effort::Effort;
-use upt_cli::tool_scale;
+use host::Effort;
+use yardstick::tool_scale;
 
 /// A programme by a bundle: of several cases the medians, the worst, and how far any of them goes.
 #[derive(Clone, Serialize)]
@@ -96,7 +96,7 @@ fn truth(
         Some(tool) => {
             let order = ToolOrder {
                 load: Some(load),
-                scale: tool_scale::Chosen::of(tool_scale::Arguments::default(), mesh, None).scale,
+                scale: tool_scale::Chosen::of(None, mesh, None).scale,
                 ..ToolOrder::new(tool, seed)
             };
             simulate_tools(mesh, boundary, order, &options, |_, _| {})

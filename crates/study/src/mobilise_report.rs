@@ -25,10 +25,10 @@ use upt::{
 use crate::quantile::median;
 use crate::report::options::Options;
 use crate::table::{Column, Table, or_dash};
-use upt_cli::bundle_folder::BundleFolder;
-use upt_cli::effort::Effort;
-use upt_cli::manifest::Manifest;
+use host::Effort;
 use upt_cli::marks::replace_between;
+use yardstick::bundle_folder::BundleFolder;
+use yardstick::manifest::Manifest;
 
 /// Led, let go, held again, led back: a second each.
 const STEPS: u32 = 80;

@@ -12,7 +12,8 @@ use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use crate::{doctor, python};
+use crate::doctor;
+use foreign::python;
 use index::Index;
 use source::Source;
 

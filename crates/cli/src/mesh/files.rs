@@ -5,13 +5,15 @@ use std::process::ExitCode;
 
 use anyhow::bail;
 use clap::Args;
+use foreign::labels::{Said, convert};
+use make::regions;
 use serde_json::json;
 use tissue::mesh_import::{ImportOptions, RawTets, Region, Resolution, from_tets, import};
 use tissue::mesh_quality::measure;
 use tissue::stuffing::{GridField, HalfSpace, stuff};
 
 use super::{print_quality, sets};
-use crate::{foreign, regions};
+use crate::progress;
 
 #[derive(Debug, Args)]
 #[command(
@@ -107,9 +109,14 @@ pub fn run_import(args: &Import) -> anyhow::Result<ExitCode> {
     let name = args.input.file_name().unwrap_or_default();
     let stem = name.to_string_lossy().split('.').next().map(String::from);
     let folder = args.output.with_extension("").with_extension("labels");
-    let input = foreign::convert(&args.input, &args.label, &folder, args.json, &mut |said| {
-        found.push(said.to_owned())
+    let (watch, mut bar) = (progress::watch(args.json), None);
+    let input = convert(&args.input, &args.label, &folder, &mut |said| match said {
+        Said::Line(line) => found.push(line.to_owned()),
+        Said::Percent(done) => bar
+            .get_or_insert_with(|| watch.bar(100, "reading the labels"))
+            .set_position(done),
     })?;
+    drop(bar);
     let is_volume = input != args.input;
     let scale = regions::millimetres(&args.unit)?;
     let mut imported = import(

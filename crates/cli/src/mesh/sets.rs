@@ -7,7 +7,7 @@ use tissue::mesh::Mesh;
 use tissue::mesh_import::{ImportError, Opened, Region, faces_in, nodes_in};
 use tissue::mesh_quality::measure;
 
-use crate::regions;
+use make::regions;
 
 /// Fills the sets: nodes in `fixed`, faces with their centroid in `domain`, and of the surface's nodes those outside `window` that are
 /// not fixed (without a window none). `input` is the file that the mesh came from, `scale` millimetres a unit.

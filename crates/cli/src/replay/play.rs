@@ -7,7 +7,7 @@ use upt::replay::lines::{Cut, Line, Step};
 use upt::replay::loads::Pose;
 use upt::{Blade, Contact, GroupMotion, Loads, Pressure, Scene, StepInput, SupportPose, Tie, Tool};
 
-use crate::manifest::hex;
+use yardstick::manifest::hex;
 
 /// A scene, and the hulls that its lines have named.
 pub struct Player {

@@ -6,7 +6,7 @@ use anyhow::Result;
 use upt::{Vector, ffi};
 
 use super::protocol::Tool;
-use crate::host::{Scene, instrument};
+use host::{Scene, instrument};
 
 /// How far the support goes up, mm, and how long a breath takes, s.
 const HEIGHT_MM: f64 = 15.0;

@@ -3,7 +3,7 @@
 use upt::ffi;
 
 use super::protocol::{Kind, Tool};
-use crate::host::instrument;
+use host::instrument;
 
 /// From this friction on, nodes that are moved by the tool stick to it.
 const STICKS: f32 = 0.5;

@@ -18,8 +18,8 @@ use tungstenite::{Error, Message, WebSocket};
 use super::http::{Request, answer};
 use super::protocol::{LONGEST_MESSAGE, Wish};
 use super::session::Session;
-use crate::host::{Model, ModelSettings};
-use crate::three;
+use host::{Model, ModelSettings};
+use page::three;
 
 /// Least time between two frames: 240 a second.
 const SOONEST: Duration = Duration::from_micros(4_166);

@@ -15,7 +15,7 @@ use super::clock::{Clock, between};
 use super::instruments::pressing;
 use super::protocol::{HEADER, Hello, Kind, SurfaceHeader, Tool, Wish};
 use super::surgery::Surgery;
-use crate::host::{Model, Scene};
+use host::{Model, Scene};
 
 /// A recording ends after so many steps: a quarter of an hour of 20 ms.
 const LONGEST_RECORDING: usize = 45_000;

@@ -10,7 +10,7 @@ use upt::ffi;
 
 use super::protocol::{Kind, SurfaceHeader, Tool};
 use super::undone::{Account, Before, keep};
-use crate::host::{Model, Scene, instrument};
+use host::{Model, Scene, instrument};
 
 /// Of the blade, from its tip, mm.
 const EDGE_MM: f32 = 20.0;

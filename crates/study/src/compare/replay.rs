@@ -7,8 +7,8 @@ use tissue::trajectory::Trajectory;
 
 use super::observer::{Moment, Observer, Truth};
 use crate::bench::Bench;
-use upt_cli::dataset::finished;
 use upt_cli::progress;
+use yardstick::finished;
 
 /// The cases of a scheme or regime.
 pub struct Group {

@@ -12,11 +12,10 @@ use tissue::solver::Solver;
 
 use crate::bench::{Bench, names};
 use crate::table::{Column, Table};
-use upt_cli::host;
 use upt_cli::plot::label;
 use upt_cli::progress;
-use upt_cli::yardstick::drive::{Drive, Driver};
-use upt_cli::yardstick::yard::Yard;
+use yardstick::drive::{Drive, Driver};
+use yardstick::yard::Yard;
 
 /// Seeds that no dataset has.
 const SEEDS: u64 = 80_000;

@@ -4,8 +4,8 @@ use contact::Samples;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use upt_cli::yardstick::CaseFigures;
-use upt_cli::yardstick::cases::ToolCase;
+use yardstick::CaseFigures;
+use yardstick::cases::ToolCase;
 
 /// One case, in the terms of the limits.
 #[derive(Clone, Debug, Serialize)]

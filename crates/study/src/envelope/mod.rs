@@ -14,11 +14,13 @@ use serde_json::{Value, json};
 use tissue::mesh::{Boundary, Mesh};
 
 use crate::tools::bundles;
+use host::Effort;
 use limits::{Limits, Tried};
-use upt_cli::bundle_folder::BundleFolder;
-use upt_cli::effort::Effort;
-use upt_cli::manifest::Manifest;
-use upt_cli::yardstick::cases::{Split, ToolCases};
+use upt_cli::one_of::one_of;
+use upt_cli::progress;
+use yardstick::bundle_folder::BundleFolder;
+use yardstick::cases::{Split, ToolCases};
+use yardstick::manifest::Manifest;
 
 /// Options of `upt-study envelope`.
 #[derive(Debug, Args)]
@@ -32,7 +34,7 @@ pub struct Options {
     #[arg(long, required = true)]
     tools: Vec<PathBuf>,
     /// Which cases of a dataset.
-    #[arg(long, value_enum, default_value_t = Split::All)]
+    #[arg(long, default_value = "all", value_parser = one_of(&Split::ALL, Split::name))]
     split: Split,
     /// The most cases of each programme.
     #[arg(long, default_value_t = 100)]
@@ -80,7 +82,14 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     };
     let mesh = Mesh::read(&bundle.mesh_file)?;
     cases.check(&mesh)?;
-    let figures = upt_cli::yardstick::solved(&bundle, corrections, &cases, &mesh, options.threads)?;
+    let figures = yardstick::solved(
+        &bundle,
+        corrections,
+        &cases,
+        &mesh,
+        options.threads,
+        &progress::watch(false),
+    )?;
     let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
     let samples = mesh.samples(boundary);
     let good = |mse: f64, inverted: usize| mse <= options.limit_mm2 && inverted == 0;

@@ -5,8 +5,8 @@ use tissue::programmes::ToolProgramme;
 use super::limits::{Limits, Tried};
 use crate::quantile::quantile;
 use crate::table::{Table, or_dash};
+use host::Effort;
 use upt_cli::counted::counted;
-use upt_cli::effort::Effort;
 use upt_cli::plot::label;
 
 /// A range of one quantity.

@@ -28,10 +28,10 @@ use upt::{Corrections, Model, ModelOptions, SceneOptions};
 use gesture::{GESTURES, Site};
 use play::Player;
 use table::{Account, Row};
-use upt_cli::bundle_folder::BundleFolder;
-use upt_cli::machine::{Machine, load_words};
 use upt_cli::marks::replace_between;
 use upt_cli::progress;
+use yardstick::bundle_folder::BundleFolder;
+use yardstick::machine::{Machine, load_words};
 
 #[derive(clap::Args)]
 #[command(

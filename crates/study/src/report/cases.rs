@@ -7,8 +7,8 @@ use sha2::{Digest, Sha256};
 use tissue::baselines::DecayFit;
 use tissue::trajectory::{Trajectory, TrajectoryHeader};
 
-use upt_cli::bundle_folder::is_one_tissue;
-use upt_cli::dataset::finished;
+use yardstick::bundle_folder::is_one_tissue;
+use yardstick::finished;
 
 /// One simulated contact.
 pub struct Case {

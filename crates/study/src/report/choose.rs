@@ -8,9 +8,9 @@ use tissue::mesh::Mesh;
 use super::cases::Cases;
 use super::method::Method;
 use super::{Options, Region, paper_split, same_body};
-use upt_cli::bundle_folder::BundleFolder;
-use upt_cli::effort::Effort;
-use upt_cli::yardstick::prior_alone::PriorAlone;
+use host::Effort;
+use yardstick::bundle_folder::BundleFolder;
+use yardstick::prior_alone::PriorAlone;
 
 /// The bundles whose mesh, boundary and tissue are the cases'; the others are named in `notes`.
 pub fn fitting_bundles(

@@ -8,7 +8,7 @@ use super::cases::Cases;
 use super::float32_frames;
 use super::measure::Plan;
 use super::method::Method;
-use upt_cli::preview::{Content, Film, page};
+use page::{Content, Film, page};
 
 /// The page; none where no bundle is in the report.
 pub fn viewer(cases: &Cases, mesh: &Mesh, methods: &[Method]) -> Result<Option<String>> {

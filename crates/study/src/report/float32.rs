@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use super::measure::{self, Plan};
 use super::method::Method;
-use upt_cli::setting::{Precision, Provider, Region};
+use yardstick::setting::{Precision, Provider, Region};
 
 /// The frames of the first case, from the second on, by the plain float32 path of the method's bundle: CPU, one thread, all nodes.
 pub(super) fn float32_frames(

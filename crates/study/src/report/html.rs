@@ -7,7 +7,7 @@ use base64::Engine;
 use super::plot::{self, Band, Latencies, Point, Stages};
 use super::row::{Measurement, Row};
 use super::table::COLUMNS;
-use upt_cli::effort::Effort;
+use host::Effort;
 use upt_cli::plot::{colour, escape};
 
 /// Facts above the figures: name and value.
@@ -36,7 +36,7 @@ pub struct Page<'a> {
     /// Indices of the measurements that the curves, histogram and stages show.
     pub shown: Vec<usize>,
     pub galleries: Vec<Gallery>,
-    /// A page of [`upt_cli::preview`] in which the first case plays.
+    /// A page of [`page`] in which the first case plays.
     pub viewer: Option<String>,
     pub dt: f64,
     /// Remarks under the table: what was left out and why.
@@ -124,7 +124,7 @@ pub fn closing(mut out: String, facts: &Facts) -> String {
     out
 }
 
-/// The section with a page of [`upt_cli::preview`] in it.
+/// The section with a page of [`page`] in it.
 pub fn playing(out: &mut String, viewer: &str) {
     let body = format!(
         "<iframe title=\"the first case, playing\" srcdoc=\"{}\"></iframe>",

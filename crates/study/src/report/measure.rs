@@ -10,7 +10,7 @@ use super::memory::Resident;
 use super::method::{Method, Stepper};
 use super::row::{Measurement, PRIOR_ALONE, Pictured, Row, mean_and_deviation};
 use crate::quantile::quantile;
-use upt_cli::errors::{CaseErrors, StepErrors, step_errors};
+use yardstick::errors::{CaseErrors, StepErrors, step_errors};
 
 /// What a measurement is asked to do.
 pub struct Plan<'a> {
@@ -138,7 +138,7 @@ pub fn describe(method: &Method, mesh: &Mesh) -> Row {
         nodes: mesh.node_count() as u64,
         ..Row::default()
     };
-    let named = |row: &mut Row, bundle: &upt_cli::bundle_folder::BundleFolder| {
+    let named = |row: &mut Row, bundle: &yardstick::bundle_folder::BundleFolder| {
         row.bundle = bundle.name.clone();
         row.bundle_sha256 = bundle.sha256.clone();
     };

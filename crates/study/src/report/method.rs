@@ -11,10 +11,10 @@ use tissue::trajectory::TrajectoryHeader;
 #[cfg(feature = "linear")]
 use tissue::{baselines::LinearQuasiStatic, linear::Lame};
 
-use upt_cli::bundle_folder::BundleFolder;
-use upt_cli::effort::Effort;
-use upt_cli::setting::{Precision, Provider, Region};
-use upt_cli::surrogate::Surrogate;
+use host::Effort;
+use yardstick::bundle_folder::BundleFolder;
+use yardstick::setting::{Precision, Provider, Region};
+use yardstick::surrogate::Surrogate;
 
 /// A method in one configuration.
 #[derive(Clone, Debug)]
@@ -58,7 +58,7 @@ pub enum Method {
 pub enum Stepper {
     Surrogate(Box<Surrogate>),
     PaperSplit(Box<super::paper_split::PaperSplit>),
-    Prior(Box<upt_cli::yardstick::prior_alone::PriorAlone>),
+    Prior(Box<yardstick::prior_alone::PriorAlone>),
     Zero,
     #[cfg(feature = "linear")]
     Linear(Box<LinearQuasiStatic>),
@@ -82,7 +82,7 @@ impl Stepper {
                 threads,
                 corrections,
             } => {
-                let settings = upt_cli::surrogate::settings(
+                let settings = yardstick::surrogate::settings(
                     *threads,
                     *provider,
                     *precision,
@@ -98,7 +98,7 @@ impl Stepper {
                 bundle,
                 threads,
                 decay,
-            } => Self::Prior(Box::new(upt_cli::yardstick::prior_alone::PriorAlone::new(
+            } => Self::Prior(Box::new(yardstick::prior_alone::PriorAlone::new(
                 bundle, *decay, *threads,
             )?)),
             Method::Zero => Self::Zero,

@@ -33,7 +33,7 @@ use crate::mobilise_report;
 use crate::shown;
 use crate::tools;
 use cache::Cache;
-use upt_cli::machine::Machine;
+use yardstick::machine::Machine;
 
 use cases::Cases;
 use float32::float32_frames;
@@ -41,7 +41,7 @@ use measure::Plan;
 use method::Method;
 pub use options::Options;
 use row::Measurement;
-use upt_cli::setting::Region;
+use yardstick::setting::Region;
 
 pub fn run(options: &Options) -> Result<ExitCode> {
     if !options.load.is_empty() {

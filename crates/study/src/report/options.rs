@@ -7,10 +7,11 @@ use tissue::hang::HangSizes;
 use tissue::load_programmes::LoadProgramme;
 use tissue::programmes::ToolProgramme;
 
-use upt_cli::effort::Effort;
-use upt_cli::setting::{Precision, Provider, Region};
+use host::Effort;
+use upt_cli::one_of::one_of;
 use upt_cli::simulate::LoadArguments;
-use upt_cli::yardstick::cases::Split;
+use yardstick::cases::Split;
+use yardstick::setting::{Precision, Provider, Region};
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -41,7 +42,7 @@ pub struct Options {
     #[arg(long = "tools", value_name = "PATH", conflicts_with_all = ["trajectories", "data"])]
     pub tools: Vec<PathBuf>,
     /// Cases of the datasets of --tools: held-out ones, those that bundles may learn from, or both.
-    #[arg(long, default_value = "test", requires = "tools")]
+    #[arg(long, default_value = "test", requires = "tools", value_parser = one_of(&Split::ALL, Split::name))]
     pub split: Split,
     /// Measure what a host shows between steps, at this many frames a second; --tools names datasets with frames shorter than a step
     /// (`upt dataset --tools all --frame-ms 5`). Writes shown.json and pictures; --markdown replaces the part between the markers
@@ -102,12 +103,12 @@ pub struct Options {
     #[arg(long, value_delimiter = ',', default_values_t = default_threads(), hide_default_value = true)]
     pub threads: Vec<u32>,
     /// Nodes that a step computes: all, those of the surface, or those of the domain.
-    #[arg(long, value_delimiter = ',', default_value = "all,surface")]
+    #[arg(long, value_delimiter = ',', default_value = "all,surface", value_parser = one_of(&Region::ALL, Region::name))]
     pub region: Vec<Region>,
     /// Default: float32, and whatever else the bundle and this CPU support.
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', value_parser = one_of(&Precision::ALL, Precision::name))]
     pub precision: Vec<Precision>,
-    #[arg(long, value_delimiter = ',', default_value = "cpu")]
+    #[arg(long, value_delimiter = ',', default_value = "cpu", value_parser = one_of(&Provider::ALL, Provider::name))]
     pub provider: Vec<Provider>,
     /// Corrections per step in contact: counts, or COUNT@MM for at most COUNT and fewer once the estimated error is below MM. Default: none and
     /// as many as the bundle recommends; with all nodes and the most threads also 0, 1, 3, 5 and 10.

@@ -11,7 +11,7 @@ use tissue::mesh::{Boundary, Mesh};
 use upt::bundle::Graph;
 use upt::graph::SupernodeGraph;
 
-use upt_cli::bundle_folder::BundleFolder;
+use yardstick::bundle_folder::BundleFolder;
 
 /// The node features that this rival can fill.
 #[derive(Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! A row of the report and all that was measured for it.
 
+use host::Effort;
 use serde::{Deserialize, Serialize};
-use upt_cli::effort::Effort;
 
 /// The method of rows that run a bundle's linear response without what the bundle learned.
 pub const PRIOR_ALONE: &str = "linear response alone";

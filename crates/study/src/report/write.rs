@@ -9,7 +9,7 @@ use super::cases::Cases;
 use super::row::{Measurement, Row};
 use super::{Options, html, pictures, table};
 use crate::date::date;
-use upt_cli::machine::Machine;
+use yardstick::machine::Machine;
 
 /// What was measured on which cases: all that a report says.
 pub struct Findings<'a> {

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::host::{LATE, PRESENT, Shown, WAYS};
 use crate::quantile::median;
-use upt_cli::yardstick::cases::ToolCase;
+use yardstick::cases::ToolCase;
 
 /// Programme of the row over all.
 pub const ALL: &str = "all";

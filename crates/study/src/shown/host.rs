@@ -5,9 +5,9 @@ use tissue::metrics;
 use tissue::schemes::FRAME_S;
 
 use super::truth::{Truth, places};
-use upt_cli::yardstick::cases::ToolCase;
-use upt_cli::yardstick::drive::Driver;
-use upt_cli::yardstick::yard::{Yard, jump};
+use yardstick::cases::ToolCase;
+use yardstick::drive::Driver;
+use yardstick::yard::{Yard, jump};
 
 /// Ways to draw a frame.
 pub const WAYS: [&str; 3] = [

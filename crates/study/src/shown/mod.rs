@@ -26,18 +26,18 @@ use tissue::mesh::{Boundary, Mesh};
 
 use crate::report::options::Options;
 use crate::tools::bundles::fitting;
+use ::host::Effort;
+use ::host::{Model, ModelSettings};
 use figures::CaseFigures;
 use host::{Clock, Shown};
 use truth::Truth;
 use upt_cli::counted::counted;
-use upt_cli::effort::Effort;
-use upt_cli::host::{Model, ModelSettings};
-use upt_cli::machine::{Machine, load_words};
 use upt_cli::marks::replace_between;
 use upt_cli::progress;
-use upt_cli::yardstick::cases::ToolCases;
-use upt_cli::yardstick::drive::{Drive, Driver};
-use upt_cli::yardstick::yard::Yard;
+use yardstick::cases::ToolCases;
+use yardstick::drive::{Drive, Driver};
+use yardstick::machine::{Machine, load_words};
+use yardstick::yard::Yard;
 
 /// Measures, and writes shown.json and the pictures.
 pub fn report(options: &Options, hz: f64) -> Result<ExitCode> {

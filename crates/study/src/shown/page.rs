@@ -13,7 +13,7 @@ use super::truth::Truth;
 use crate::table::{Column, Table};
 use crate::tools::section;
 use upt_cli::plot::{Axes, Scale, label};
-use upt_cli::yardstick::cases::{ToolCase, ToolCases};
+use yardstick::cases::{ToolCase, ToolCases};
 
 const COLOURS: [&str; 3] = ["#c2553f", "#b08a2e", "#8fb3d3"];
 /// Of frames with the bundle's frame step.

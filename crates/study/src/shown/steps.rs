@@ -15,16 +15,16 @@ use crate::quantile::median;
 use crate::report::options::Options;
 use crate::table::{Column, Table};
 use crate::tools::bundles::fitting;
+use host::Effort;
+use host::{Model, ModelSettings};
 use upt_cli::counted::counted;
-use upt_cli::effort::Effort;
-use upt_cli::host::{Model, ModelSettings};
-use upt_cli::machine::Machine;
 use upt_cli::marks::replace_between;
 use upt_cli::plot::label;
 use upt_cli::progress;
-use upt_cli::yardstick::cases::{ToolCase, ToolCases};
-use upt_cli::yardstick::drive::{Drive, Driver};
-use upt_cli::yardstick::yard::Yard;
+use yardstick::cases::{ToolCase, ToolCases};
+use yardstick::drive::{Drive, Driver};
+use yardstick::machine::Machine;
+use yardstick::yard::Yard;
 
 /// The truth's forces are taken as their mean over this time about a moment, s: impulses of contact are noisy.
 const FORCE_S: f64 = 0.025;

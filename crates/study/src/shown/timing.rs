@@ -8,8 +8,8 @@ use tissue::schemes::FRAME_S;
 use super::host::Clock;
 use super::truth::Truth;
 use crate::quantile::quantile;
-use upt_cli::yardstick::cases::ToolCases;
-use upt_cli::yardstick::drive::Driver;
+use yardstick::cases::ToolCases;
+use yardstick::drive::Driver;
 
 /// Nodes of the small region.
 const FEW: usize = 1000;

@@ -5,9 +5,9 @@ use contact::{Pose, pose};
 use tissue::schemes::FRAME_S;
 use tissue::solver::ToolPose;
 
-use upt_cli::yardstick::cases::ToolCase;
-use upt_cli::yardstick::measure::{SLIP_MM, SLIP_WINDOW};
-use upt_cli::yardstick::yard::jump;
+use yardstick::cases::ToolCase;
+use yardstick::measure::{SLIP_MM, SLIP_WINDOW};
+use yardstick::yard::jump;
 
 /// A case's frames in time.
 pub struct Truth {

@@ -11,7 +11,7 @@ use upt::{Contact, Corrections, Error, Scene, SceneOptions, flag};
 
 use super::Row;
 use crate::bench::{Bench, Touch, largest, names, push};
-use upt_cli::yardstick::yard::Yard;
+use yardstick::yard::Yard;
 
 /// Corrections a step.
 const COUNTS: [u32; 4] = [1, 3, 5, 10];

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 
-use upt_cli::bundle_folder::BundleFolder;
-use upt_cli::yardstick::cases::ToolCases;
+use yardstick::bundle_folder::BundleFolder;
+use yardstick::cases::ToolCases;
 
 /// The bundles made for the cases' mesh, boundary and tissue; where bundles were named, another is an error.
 pub fn fitting(

@@ -3,11 +3,10 @@
 use anyhow::Result;
 use tissue::mesh::Mesh;
 
-use upt_cli::host;
-use upt_cli::preview::{Content, Film, page};
-use upt_cli::yardstick::Method;
-use upt_cli::yardstick::cases::ToolCases;
-use upt_cli::yardstick::drive::{Drive, Driver};
+use page::{Content, Film, page};
+use yardstick::Method;
+use yardstick::cases::ToolCases;
+use yardstick::drive::{Drive, Driver};
 
 /// The page; none where no method solves contact.
 pub fn viewer(

@@ -2,9 +2,9 @@
 
 use super::section::TRUTH;
 use upt_cli::plot::{Axes, Scale, escape};
-use upt_cli::yardstick::cases::ToolCase;
-use upt_cli::yardstick::drive::Felt;
-use upt_cli::yardstick::measure::{Outcome, Truth};
+use yardstick::cases::ToolCase;
+use yardstick::drive::Felt;
+use yardstick::measure::{Outcome, Truth};
 
 fn size(felt: &Felt) -> f64 {
     felt.force.iter().map(|v| v * v).sum::<f64>().sqrt()

@@ -1,6 +1,6 @@
 //! What came of a method.
 
-use upt_cli::yardstick::measure::Outcome;
+use yardstick::measure::Outcome;
 
 /// A method's cases.
 pub struct Measured {

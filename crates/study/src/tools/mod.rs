@@ -24,17 +24,18 @@ use serde_json::json;
 use tissue::mesh::{Boundary, Mesh};
 
 use crate::report::options::Options;
+use host::Effort;
 use measured::Measured;
 use row::Label;
-use upt_cli::bundle_folder::BundleFolder;
-use upt_cli::effort::Effort;
-use upt_cli::yardstick::cases::ToolCases;
-use upt_cli::yardstick::drive::Drive;
-use upt_cli::yardstick::measure::Truth;
-use upt_cli::yardstick::prior_alone::PriorAlone;
-use upt_cli::yardstick::yard::Yard;
-use upt_cli::yardstick::{CaseFigures, Method};
+use upt_cli::progress;
 use write::{Made, write};
+use yardstick::bundle_folder::BundleFolder;
+use yardstick::cases::ToolCases;
+use yardstick::drive::Drive;
+use yardstick::measure::Truth;
+use yardstick::prior_alone::PriorAlone;
+use yardstick::yard::Yard;
+use yardstick::{CaseFigures, Method};
 
 /// Measures, and writes tools.json and tools.html.
 pub fn report(options: &Options) -> Result<ExitCode> {
@@ -68,7 +69,14 @@ pub fn report(options: &Options) -> Result<ExitCode> {
     let methods = methods(options, &bundles);
     for method in &methods {
         let name = method.name();
-        match method.measure(options.most_threads(), &cases, &mesh, &truths, &mut yard) {
+        match method.measure(
+            options.most_threads(),
+            &cases,
+            &mesh,
+            &truths,
+            &mut yard,
+            &progress::watch(false),
+        ) {
             Ok((outcomes, figures)) => {
                 details.push(json!({"method": name, "cases": figures}));
                 rows.extend(row::rows(&label_of(method), &figures));

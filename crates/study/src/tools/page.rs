@@ -23,7 +23,7 @@ pub struct Page<'a> {
     /// Names of the methods in the pictures, with their colours.
     pub keys: Vec<(String, &'static str)>,
     pub pictured: Vec<Pictured>,
-    /// A page of [`upt_cli::preview`] in which the first case plays with its tools.
+    /// A page of [`page`] in which the first case plays with its tools.
     pub viewer: Option<String>,
     pub notes: Vec<String>,
     pub facts: Facts,

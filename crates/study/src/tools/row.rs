@@ -1,8 +1,8 @@
 //! Rows of the yardstick: a bundle, a way of driving it, corrections and a programme.
 
+use host::Effort;
 use serde::Serialize;
-use upt_cli::effort::Effort;
-use upt_cli::yardstick::CaseFigures;
+use yardstick::CaseFigures;
 
 use crate::quantile::median;
 

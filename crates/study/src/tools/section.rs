@@ -6,7 +6,7 @@ use contact::{Body, Pose, Vector};
 use tissue::mesh::Mesh;
 
 use upt_cli::plot::escape;
-use upt_cli::yardstick::cases::ToolCase;
+use yardstick::cases::ToolCase;
 
 /// Half the width and half the height of the picture, mm.
 const HALF_MM: [f32; 2] = [26.0, 17.0];

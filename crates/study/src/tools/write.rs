@@ -12,12 +12,12 @@ use super::{force, page, section, table};
 use crate::report::options::Options;
 use crate::table::Table;
 use upt_cli::counted::counted;
-use upt_cli::machine::Machine;
 use upt_cli::marks::replace_between;
 use upt_cli::plot::colour;
-use upt_cli::yardstick::cases::ToolCases;
-use upt_cli::yardstick::drive::Drive;
-use upt_cli::yardstick::measure::{Outcome, Truth};
+use yardstick::cases::ToolCases;
+use yardstick::drive::Drive;
+use yardstick::machine::Machine;
+use yardstick::measure::{Outcome, Truth};
 
 /// The first case of each programme, with every method in it.
 fn pictures(

@@ -1,6 +1,6 @@
 //! The frontier: error against run time, both logarithmic, with the Pareto front drawn.
 
-use upt_cli::effort::Effort;
+use host::Effort;
 use upt_cli::plot::{Axes, Scale, label, legend};
 
 /// Below this an error is round-off of the reference itself, mm².

@@ -11,7 +11,7 @@ use upt::{ffi, flag};
 use super::hand::{Site, between, sites};
 use crate::bench::{Bench, names};
 use crate::stress::Row;
-use upt_cli::host::{self, Scene, instrument};
+use host::{self, Scene, instrument};
 
 /// Operations of the first case, and steps after each.
 const OPERATIONS: usize = 100;

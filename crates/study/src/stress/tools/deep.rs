@@ -12,7 +12,6 @@ use super::run::Hands;
 use crate::bench::Bench;
 use crate::processor_time::ProcessorTime;
 use crate::stress::Row;
-use upt_cli::host;
 
 const STEPS: usize = 1000;
 /// Steps at new poses with the same tools.

@@ -9,8 +9,7 @@ use tissue::solver::{Tool, ToolPose};
 use super::Row;
 use super::hand::{at, central, rod};
 use crate::bench::Bench;
-use upt_cli::host;
-use upt_cli::yardstick::drive::{Drive, Driver};
+use yardstick::drive::{Drive, Driver};
 
 /// More instruments than a scene takes at once.
 const TOO_MANY: usize = 65;

@@ -9,9 +9,8 @@ use upt::flag;
 
 use crate::bench::{Bench, names};
 use crate::stress::Row;
-use upt_cli::host;
-use upt_cli::yardstick::drive::{Drive, Driver};
-use upt_cli::yardstick::yard::Yard;
+use yardstick::drive::{Drive, Driver};
+use yardstick::yard::Yard;
 
 /// Flags that say that elements are inside out, or that the answer is the linear one.
 const INVERTED: u32 = flag::INVERTED | flag::FELL_BACK;
