@@ -1,5 +1,6 @@
-//! Bundles beside the reference solver, which runs here: what `report --load`, `--hang` and `--cut` have in common.
+//! Bundles beside the reference solver, which runs here: what `report --load`, `--hang`, `--cut` and `--mobilise` have in common.
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
@@ -20,6 +21,7 @@ use yardstick::bundle_folder::BundleFolder;
 /// A bundle, its mesh, and the corrections that are asked for.
 pub struct Subject {
     pub name: String,
+    pub path: PathBuf,
     pub mesh: Mesh,
     pub boundary: Boundary,
     pub model: Arc<Model>,
@@ -61,6 +63,15 @@ impl Subject {
         };
         Ok(Scene::new(Arc::clone(&self.model), &options)?)
     }
+
+    /// The same of a changed copy of the bundle.
+    ///
+    /// # Errors
+    /// The copy cannot be opened.
+    pub fn in_copy(self, folder: &Path) -> Result<Self> {
+        let model = open(folder)?;
+        Ok(Self { model, ..self })
+    }
 }
 
 /// Measures each bundle of `asked`, prints one table of all rows (or JSON), and writes it into the pages between the markers `mark`.
@@ -68,7 +79,7 @@ pub fn report<R: Serialize>(
     asked: &Options,
     mark: &str,
     (words, columns): (&'static [usize], &[Column<R>]),
-    measure: impl Fn(&Subject) -> Result<Vec<R>>,
+    measure: impl Fn(Subject) -> Result<Vec<R>>,
 ) -> Result<ExitCode> {
     if asked.bundles.is_empty() {
         bail!("name the bundles to measure with --bundle");
@@ -80,8 +91,8 @@ pub fn report<R: Serialize>(
         let subject = Subject {
             mesh: Mesh::read(&bundle.mesh_file)?,
             boundary: bundle.boundary.parse().map_err(anyhow::Error::msg)?,
-            model: Model::open(path, &ModelOptions::default())
-                .with_context(|| path.display().to_string())?,
+            model: open(path)?,
+            path: path.clone(),
             efforts: match asked.corrections.as_slice() {
                 [] => vec![recommended],
                 efforts => efforts.to_vec(),
@@ -89,7 +100,7 @@ pub fn report<R: Serialize>(
             name: bundle.name,
             threads: asked.most_threads() as usize,
         };
-        rows.extend(measure(&subject)?);
+        rows.extend(measure(subject)?);
     }
     let table = Table::of(words, columns, &rows).markdown();
     match asked.json {
@@ -100,6 +111,10 @@ pub fn report<R: Serialize>(
         replace_between(page, mark, &format!("\n{table}"))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn open(bundle: &Path) -> Result<Arc<Model>> {
+    Model::open(bundle, &ModelOptions::default()).with_context(|| bundle.display().to_string())
 }
 
 /// What steps took and how they held.

@@ -57,11 +57,11 @@ pub fn report(asked: &Options) -> Result<ExitCode> {
     beside::report(asked, "study report --hang", (&[0], &COLUMNS), |subject| {
         let case = |seed| {
             eprintln!("{}: case {seed} of {}", subject.name, asked.hang);
-            truth(asked, seed, subject)
+            truth(asked, seed, &subject)
         };
         let truths: Vec<Truth> = (1..=asked.hang as u64).map(case).collect::<Result<_>>()?;
         let efforts = subject.efforts.iter();
-        (efforts.map(|effort| measure(*effort, subject, &truths))).collect()
+        (efforts.map(|effort| measure(*effort, &subject, &truths))).collect()
     })
 }
 

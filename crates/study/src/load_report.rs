@@ -50,10 +50,10 @@ pub fn report(asked: &Options) -> Result<ExitCode> {
             eprintln!("{}: {}", subject.name, programme.name());
             let seeds = asked.seed..asked.seed + if asked.tool.is_some() { asked.seeds } else { 1 };
             let truths: Vec<Trajectory> = seeds
-                .map(|seed| truth(asked, (*programme, seed), subject))
+                .map(|seed| truth(asked, (*programme, seed), &subject))
                 .collect::<Result<_>>()?;
             for effort in &subject.efforts {
-                let case = |truth| measure(asked, (*programme, *effort), subject, truth);
+                let case = |truth| measure(asked, (*programme, *effort), &subject, truth);
                 let cases: Vec<Row> = truths.iter().map(case).collect::<Result<_>>()?;
                 rows.push(joined(&cases)?);
             }

@@ -5,30 +5,22 @@
 
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use contact::{Rotation, Shape, Vector};
+use host::Effort;
 use serde::Serialize;
 use serde_json::json;
-use tissue::mesh::{Boundary, Mesh};
+use tissue::mesh::Mesh;
 use tissue::schemes::FRAME_S;
-use tissue::solver::{
-    ContactNode, Loads as TrueLoads, Solver, SolverOptions, Tool as Rigid, ToolPose,
-};
-use upt::{
-    Contact, Corrections, GroupMotion, Loads, Model, ModelOptions, Scene, SceneOptions, StepInput,
-    SupportPose, Tool,
-};
+use tissue::solver::{ContactNode, Loads as TrueLoads, Solver, Tool as Rigid, ToolPose};
+use upt::{Contact, GroupMotion, Loads, StepInput, SupportPose, Tool};
+use yardstick::manifest::Manifest;
 
+use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
 use crate::quantile::median;
 use crate::report::options::Options;
-use crate::table::{Column, Table, or_dash};
-use host::Effort;
-use upt_cli::marks::replace_between;
-use yardstick::bundle_folder::BundleFolder;
-use yardstick::manifest::Manifest;
+use crate::table::Column;
 
 /// Led, let go, held again, led back: a second each.
 const STEPS: u32 = 80;
@@ -61,41 +53,21 @@ struct Row {
 
 /// Measures and prints the table.
 pub fn report(asked: &Options) -> Result<ExitCode> {
-    anyhow::ensure!(
-        !asked.bundles.is_empty(),
-        "name the bundles to measure with --bundle"
-    );
-    let mut rows = Vec::new();
-    for path in &asked.bundles {
-        let bundle = BundleFolder::read(path)?;
-        let mesh = Mesh::read(&bundle.mesh_file)?;
-        let boundary: Boundary = bundle.boundary.parse().map_err(anyhow::Error::msg)?;
-        let folder = asked.out.join(format!("mobilise-{}", bundle.name));
-        let group = in_groups(path, &mesh.held_nodes(boundary), &mesh, &folder)?;
-        let model = Model::open(&folder, &ModelOptions::default())
-            .with_context(|| folder.display().to_string())?;
-        let recommended = bundle.corrections.unwrap_or(Effort::NONE);
-        let efforts = match asked.corrections.as_slice() {
-            [] => &[recommended],
-            efforts => efforts,
-        };
+    let mark = "study report --mobilise";
+    beside::report(asked, mark, (&[0, 2], &COLUMNS), |subject| {
+        let folder = asked.out.join(format!("mobilise-{}", subject.name));
+        let held = subject.mesh.held_nodes(subject.boundary);
+        let group = in_groups(&subject.path, &held, &subject.mesh, &folder)?;
+        let subject = subject.in_copy(&folder)?;
+        let mut rows = Vec::new();
         for with_ball in [false, true] {
-            for effort in efforts {
-                eprintln!("{}: {effort}, ball: {with_ball}", bundle.name);
-                let body = (&mesh, boundary, group.as_slice());
-                rows.push(compare(asked, &bundle, &model, body, (*effort, with_ball))?);
+            for effort in &subject.efforts {
+                eprintln!("{}: {effort}, ball: {with_ball}", subject.name);
+                rows.push(compare(asked, &subject, &group, (*effort, with_ball))?);
             }
         }
-    }
-    let table = Table::of(&[0, 2], &COLUMNS, &rows).markdown();
-    match asked.json {
-        true => println!("{}", serde_json::to_string_pretty(&rows)?),
-        false => print!("{table}"),
-    }
-    for page in &asked.markdown {
-        replace_between(page, "study report --mobilise", &format!("\n{table}"))?;
-    }
-    Ok(ExitCode::SUCCESS)
+        Ok(rows)
+    })
 }
 
 /// A copy of a bundle, its body's files with it, whose held nodes are two groups; the nodes of the second.
@@ -192,34 +164,13 @@ fn ball(site: &Site, step: u32) -> Result<Tool> {
 
 fn compare(
     asked: &Options,
-    bundle: &BundleFolder,
-    model: &Arc<Model>,
-    (mesh, boundary, group): (&Mesh, Boundary, &[u32]),
+    subject: &Subject,
+    group: &[u32],
     (effort, with_ball): (Effort, bool),
 ) -> Result<Row> {
-    let options = SceneOptions {
-        threads: asked.most_threads() as usize,
-        corrections: match effort.target_mm {
-            0.0 => Corrections::Fixed(effort.most),
-            target_mm => Corrections::Auto {
-                most: effort.most,
-                target_mm,
-                budget_us: 0,
-            },
-        },
-        substeps: effort.substeps,
-        ..SceneOptions::default()
-    };
-    let scene = Scene::new(Arc::clone(model), &options)?;
-    let mut truth = Solver::new(
-        mesh,
-        boundary,
-        SolverOptions {
-            material: model.manifest.material,
-            threads: asked.most_threads() as usize,
-            ..SolverOptions::default()
-        },
-    )?;
+    let (mesh, boundary) = (&subject.mesh, subject.boundary);
+    let scene = subject.scene(effort)?;
+    let mut truth = Solver::new(mesh, boundary, subject.solver())?;
     truth.let_go(group)?;
     let gravity = asked.load_sizes.sizes().gravity_m_s2;
     let site = site(mesh)?;
@@ -234,8 +185,8 @@ fn compare(
     let mut u = vec![0.0; 3 * scene.node_count()];
     let mut wanted = vec![[0.0f32; 3]; mesh.node_count()];
     let mut grip = Vec::new();
-    let (mut errors, mut led, mut times) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut off, mut felt, mut farthest, mut smallest) = (0.0, 0.0, 0.0f64, 1.0f64);
+    let (mut errors, mut led, mut steps) = (Vec::new(), Vec::new(), Steps::default());
+    let (mut force, mut farthest) = (Relative::default(), 0.0f64);
     for step in 0..STEPS {
         let motion = motion(step);
         let part = (2.0 * f64::from(step + 1) / f64::from(STEPS)).min(1.0);
@@ -254,9 +205,8 @@ fn compare(
             },
             ..StepInput::default()
         };
-        let begun = Instant::now();
-        scene.step(input, Some(&mut u))?;
-        times.push(1e3 * begun.elapsed().as_secs_f64());
+        steps.step(&scene, input, &mut u)?;
+        ensure!(steps.refused == 0, "the guard refused a step");
         truth.set_loads(&TrueLoads {
             gravity: pulls.map(|g| 1e3 * g),
             ..TrueLoads::default()
@@ -273,36 +223,33 @@ fn compare(
         let report = truth.step_tools(&held, tools, FRAME_S)?;
         truth.displacement(&mut wanted);
         let rows = u.as_chunks::<3>().0.iter().zip(&wanted);
-        let error = rows.map(|(a, b)| square(a, b)).sum::<f64>() / wanted.len() as f64;
+        let error = rows.map(|(a, b)| square(*a, *b)).sum::<f64>() / wanted.len() as f64;
         errors.push(error);
         if !motion.let_go {
             led.push(error);
         }
-        let far = group.iter().map(|node| wanted[*node as usize]);
-        farthest = far.fold(farthest, |most, u| most.max(square(&u, &[0.0; 3]).sqrt()));
-        let det = f64::from(scene.stats().min_det);
-        if det != 0.0 {
-            smallest = smallest.min(det);
-        }
+        let far = group
+            .iter()
+            .map(|node| square(wanted[*node as usize], [0.0; 3]));
+        farthest = far.fold(farthest, f64::max);
         if with_ball && step > 2 {
-            let force = scene.with_contact_report(|report| report.readings[0].force);
-            off += square(&force, &report.tools[0].force).sqrt();
-            felt += square(&report.tools[0].force, &[0.0; 3]).sqrt();
+            let own = scene.with_contact_report(|report| report.readings[0].force);
+            force.add(own, Vector::from(report.tools[0].force));
         }
     }
     Ok(Row {
-        bundle: bundle.name.clone(),
+        bundle: subject.name.clone(),
         nodes: mesh.node_count(),
         tool: if with_ball { "ball" } else { "none" },
         corrections: effort.to_string(),
         group: group.len(),
-        farthest_mm: farthest,
+        farthest_mm: farthest.sqrt(),
         mse: median(errors.iter().copied()),
         led_mse: median(led),
-        worst_mse: errors.iter().copied().fold(0.0, f64::max),
-        force_error: (felt > 0.0).then(|| off / felt),
-        smallest_det: smallest,
-        step_ms: median(times),
+        worst_mse: largest(errors),
+        force_error: force.ratio(),
+        smallest_det: steps.smallest_det,
+        step_ms: median(steps.ms),
     })
 }
 
@@ -330,11 +277,6 @@ fn held_at(
     nodes.collect()
 }
 
-fn square(a: &[f32; 3], b: &[f32; 3]) -> f64 {
-    let pairs = a.iter().zip(b);
-    pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum()
-}
-
 const COLUMNS: [Column<Row>; 12] = [
     ("bundle", |row| format!("`{}`", row.bundle)),
     ("nodes", |row| row.nodes.to_string()),
@@ -345,9 +287,7 @@ const COLUMNS: [Column<Row>; 12] = [
     ("MSE, mm² (median)", |row| format!("{:.2e}", row.mse)),
     ("held or led", |row| format!("{:.2e}", row.led_mse)),
     ("worst", |row| format!("{:.2e}", row.worst_mse)),
-    ("force error", |row| {
-        or_dash(row.force_error, |error| format!("{:.1} %", 100.0 * error))
-    }),
+    ("force error", |row| percent(row.force_error)),
     ("smallest det F", |row| format!("{:.2}", row.smallest_det)),
     ("ms a step", |row| format!("{:.1}", row.step_ms)),
 ];

@@ -93,7 +93,7 @@ pub fn report(asked: &Options) -> Result<ExitCode> {
                         let scene = subject.scene(*effort)?;
                         let site = Site::of(&scene, seed).context("the domain has no nodes")?;
                         let frames = (programme.frames)(&site);
-                        case(subject, &scene, (&site, &frames), &mut found)
+                        case(&subject, &scene, (&site, &frames), &mut found)
                             .with_context(|| format!("{name} of seed {seed}"))?;
                     }
                     rows.push(Row {
