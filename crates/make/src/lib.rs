@@ -4,7 +4,7 @@
 //! let mut options = make::Options::new("liver.obj", "liver");
 //! options.unit = "cm".into();
 //! options.fixed = vec!["plane:0,0,-1,-20".parse().unwrap()];
-//! let made = make::run(&options, &make::Watch::default())?;
+//! let made = make::run(&options)?;
 //! # let make::Made::Bundle(made) = made else { return Ok(()) };
 //! println!("{}", made.certificate.text());
 //! # anyhow::Ok(())
@@ -20,7 +20,7 @@
 //! | [`corrections`] | the coarse space that corrections need |
 //! | [`check`] | held-out contacts against the reference solver: the certificate |
 //!
-//! [`Watch`] hears how far the work is. Errors name the option of `upt make` that mends them.
+//! [`Options::watch`] hears how far the work is. Errors name the option of `upt make` that mends them.
 
 mod body;
 mod bundle;
