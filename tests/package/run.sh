@@ -127,11 +127,17 @@ unity_complete() {
   ! grep -E 'Plugins/(Windows|macOS)' <<<"$listing"
 }
 check unity_complete unity_complete
-
 # shellcheck source=tests/package/crates.sh
 source "$root/tests/package/crates.sh"
 # shellcheck source=tests/package/recipes.sh
 source "$root/tests/package/recipes.sh"
+
+# The first page for Unity with nothing but its package.
+if command -v mcs >/dev/null && command -v mono >/dev/null; then
+  check unity_first_page "$root/tests/csharp/first_page.sh" "$(find "$work/dist" -name 'org.libupt.*.tgz' | head -n 1)" "$work/unity"
+else
+  leave_out 1 "the first page for Unity: mcs or mono is missing (Debian: apt-get install mono-mcs mono-runtime)"
+fi
 
 echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" -eq 0 ]

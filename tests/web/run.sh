@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # libupt in WebAssembly: the package in Node, beside the native library, and the site in headless Chromium.
 #
-#   UPT_WASM=upt.wasm UPT_SITE=FOLDER tests/web/run.sh
+#   UPT_WASM=upt.wasm UPT_SITE=FOLDER UPT_NPM=FOLDER tests/web/run.sh
 #
-# Reads what tests/c/run.sh reads; UPT_WASM is built with the feature `fault`. The last line is `N passed, N failed, N skipped`.
+# Reads what tests/c/run.sh reads; UPT_WASM is built with the feature `fault`. UPT_NPM is what the npm package holds. The last line is `N passed, N failed, N skipped`.
 set -euo pipefail
 root="${UPT_ROOT:-$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)}"
 build="${UPT_BUILD_DIR:-$root/target}/web/tests"
@@ -49,6 +49,19 @@ if [ -x "$upt" ]; then
 else
   leave_out 1 "a recording of the module: $upt is not there"
 fi
+echo "== the first page, with nothing but the package"
+first_page() (
+  mkdir -p "$build/first" && cd "$build/first" || exit 1
+  npm pack --silent --pack-destination . "$UPT_NPM" >packed || exit 1
+  npm install --silent --offline --no-audit --no-fund --prefix . "./$(cat packed)" || exit 1
+  sed -n '/^```js first$/,/^```$/p' node_modules/libupt/README.md | sed '/^```/d' >first.mjs
+  node first.mjs | tee said
+  # The block is pushed down, so it pushes up.
+  grep -Eqx '448 nodes, force -?[0-9]+, -?[0-9]+, [1-9][0-9]* mN' said
+)
+check "README of the package runs in Node" first_page
+same_words() { diff <(sed -n '/^```js first$/,/^```$/p' web/README.md) <(sed -n '/^```js first$/,/^```$/p' docs/guide/web.md); }
+check "the guide begins with the same program" same_words
 echo "== in a browser"
 add python3 tests/web/page.py "$UPT_SITE"
 

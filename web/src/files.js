@@ -1,10 +1,11 @@
 // The files of a bundle, from wherever the page has them: name and bytes. The library checks their sizes and hashes itself.
+import { get as usual } from "./get.js";
 import { UptError } from "./module.js";
 
 const MANIFEST = "bundle.json";
 
 /** `source`: the address of a folder, a list of `File`s, or bytes by name. */
-export async function files(source, { fetch: get = (url) => fetch(url), progress } = {}) {
+export async function files(source, { fetch: get = usual, progress } = {}) {
   if (typeof source === "string" || source instanceof URL) return fetched(new URL(`${source}`.replace(/\/?$/, "/"), globalThis.location?.href), get, progress);
   const isFile = (one) => typeof one?.arrayBuffer === "function" && "name" in one;
   const list = typeof source?.[Symbol.iterator] === "function" ? [...source] : undefined;

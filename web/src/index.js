@@ -1,6 +1,7 @@
 // libupt in WebAssembly: soft tissue that instruments press, grasp and pull, in real time. Lengths are mm, forces mN.
 import * as abi from "./abi.js";
 import { files } from "./files.js";
+import { get } from "./get.js";
 import { Module, UptError } from "./module.js";
 
 export { UptError };
@@ -24,7 +25,7 @@ function choice(names, name, what) {
 }
 
 /** Loads the library. Each call makes an instance with a memory of its own. */
-export async function load({ wasm = fetch(new URL("./upt.wasm", import.meta.url)), isa } = {}) {
+export async function load({ wasm = get(new URL("./upt.wasm", import.meta.url)), isa } = {}) {
   return new Upt(await Module.start(wasm, isa));
 }
 

@@ -15,6 +15,8 @@ use crate::{archive, venv};
 
 const TARGET: &str = "wasm32-unknown-unknown";
 const VIEW: &str = "crates/cli/src/view/page";
+/// The bundle of the package's first program.
+const BLOCK: &str = "examples/block";
 /// What that page takes from beside it.
 const THREE: [&str; 2] = ["three.js", "three.LICENSE"];
 
@@ -84,20 +86,29 @@ fn has_target(workspace: &Workspace) -> bool {
 /// The npm package.
 pub fn package(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     let root = out.join("web/package");
-    std::fs::remove_dir_all(&root).ok();
-    modules(workspace, &module(workspace, "instruments")?, &root)?;
-    for name in ["package.json", "README.md"] {
-        copy(&workspace.path("web").join(name), &root.join(name))?;
-    }
-    for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
-        copy(&workspace.path(name), &root.join(name))?;
-    }
+    unpacked(workspace, &module(workspace, "instruments")?, &root)?;
     let words = "tests/style/licences.py --write";
     let mut licences = workspace.python(words);
     run_checked(workspace, words, licences.arg(root.join("THIRD-PARTY.txt")))?;
     let file = out.join(format!("libupt-{}.tgz", env!("CARGO_PKG_VERSION")));
     archive::pack(&out.join("web"), "package", &file, archive::time(workspace))?;
     Ok(file)
+}
+
+/// The package's folder, but for the notice of what the module links.
+fn unpacked(workspace: &Workspace, wasm: &Path, root: &Path) -> Result<()> {
+    std::fs::remove_dir_all(root).ok();
+    modules(workspace, wasm, root)?;
+    for name in ["package.json", "README.md"] {
+        copy(&workspace.path("web").join(name), &root.join(name))?;
+    }
+    for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
+        copy(&workspace.path(name), &root.join(name))?;
+    }
+    for (name, place) in Workspace::bundle_files(&workspace.path(BLOCK))? {
+        copy(&place, &root.join("block").join(name))?;
+    }
+    Ok(())
 }
 
 /// The JavaScript of the package with the module.
@@ -194,6 +205,12 @@ pub fn stage(workspace: &Workspace) -> Result<Outcome> {
     let wasm = module(workspace, "instruments,fault")?;
     let site = workspace.path("target/web/site");
     write_site(workspace, &wasm, &ORGANS[..1], &site)?;
-    let environment = [("UPT_WASM", &*wasm), ("UPT_SITE", &*site)];
+    let npm = workspace.path("target/web/npm");
+    unpacked(workspace, &wasm, &npm)?;
+    let environment = [
+        ("UPT_WASM", &*wasm),
+        ("UPT_SITE", &*site),
+        ("UPT_NPM", &*npm),
+    ];
     counts::script(workspace, "web", "tests/web/run.sh", &environment)
 }
