@@ -4,6 +4,8 @@
 mod fixture;
 #[path = "haptics/loads.rs"]
 mod loads;
+#[path = "haptics/sideways.rs"]
+mod sideways;
 
 use contact::Shape;
 use fixture::{model, plain, scene};

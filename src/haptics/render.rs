@@ -24,6 +24,10 @@ const FIRST_S: f64 = 0.001;
 /// Time between calls over which samples follow forces at least, s: in none they would be rigid.
 const LEAST_S: f64 = 1e-4;
 
+/// A step arrives with an age, over which contact is solved in parts of this time, s, and in so many at most.
+const PART_S: f64 = 0.002;
+const MOST_PARTS: u32 = 8;
+
 /// A tool that a hand feels. Used from one thread, which waits for nothing: no lock, no allocation.
 pub struct Haptics {
     body: Body,
@@ -125,14 +129,8 @@ impl Haptics {
             self.age_s += passed;
             self.since_s += seconds;
         }
-        if time > 0.0 {
-            self.contact.advance(snapshot, time);
-        }
-        let least = if arrived { FIRST_S } else { LEAST_S };
-        let part = self.contact.follow(snapshot, time.max(least) as f32);
-        let way = [&before, &now];
-        self.contact
-            .solve(snapshot, &self.body, self.friction, way, part);
+        self.follow(arrived, [&before, &now], time);
+        let snapshot = self.snapshot.buffer();
         let [mut force, mut torque] = self.contact.wrench(snapshot.count, now.translation);
         let contacts = self.contact.pushing(snapshot.count).count() as u32;
         // A force starts from none, and goes on from the one before.
@@ -186,6 +184,36 @@ impl Haptics {
             excess_energy_j: self.observer.excess(),
             steps: self.seen,
         })
+    }
+}
+
+impl Haptics {
+    /// Lets the tissue follow the tool on its way, in `time` s. What a step's age brings at once goes in parts: a tip that tissue lies about
+    /// would slip out of it where contact is linearised over the whole of it.
+    fn follow(&mut self, arrived: bool, [before, now]: [&Pose; 2], time: f64) {
+        let snapshot = self.snapshot.buffer();
+        let (parts, least) = match arrived {
+            true => (
+                ((time / PART_S).ceil() as u32).clamp(1, MOST_PARTS),
+                FIRST_S,
+            ),
+            false => (1, LEAST_S),
+        };
+        let seconds = time / f64::from(parts);
+        let mut from = *before;
+        for part in 1..=parts {
+            let to = match part == parts {
+                true => *now,
+                false => pose::between(before, now, part as f32 / parts as f32),
+            };
+            if seconds > 0.0 {
+                self.contact.advance(snapshot, seconds);
+            }
+            let share = self.contact.follow(snapshot, seconds.max(least) as f32);
+            let way = [&from, &to];
+            (self.contact).solve(snapshot, &self.body, self.friction, way, share);
+            from = to;
+        }
     }
 }
 

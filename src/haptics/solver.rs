@@ -17,6 +17,8 @@ const MOST_ROWS: usize = 64;
 const SKIN_MM: f32 = 0.5;
 /// What a step put elsewhere fades out to nothing this far outside of the tissue, mm.
 pub const FADE_MM: f32 = 0.5;
+/// A tool that has gone so far sideways since the step is at other tissue, mm: two samples' spacing.
+const SLIDES_MM: f32 = 3.4;
 /// Of a solve that goes on from the one a millisecond before.
 const LIMITS: Limits = Limits {
     tolerance_mm: 1e-4,
@@ -45,6 +47,10 @@ pub struct Solver {
     stiffness: Stiffness,
     /// Distance to the nearest sample, mm.
     pub nearest: f32,
+    /// All samples that the step pushed have slid off the tool since it. Until the next step they are the tissue's plane beneath it.
+    slid: bool,
+    /// Forces, `moved` and `aim` before a solve, to which one that loses the tool goes back.
+    before: (Vec<Vector>, Vec<f32>, Vec<f32>),
 }
 
 impl Solver {
@@ -70,6 +76,12 @@ impl Solver {
             sweeps,
             stiffness: Stiffness::new()?,
             nearest: f32::MAX,
+            slid: false,
+            before: (
+                vectors(MOST_SAMPLES)?,
+                memory::zeros(3 * MOST_SAMPLES, WHAT)?,
+                memory::zeros(3 * MOST_SAMPLES, WHAT)?,
+            ),
         })
     }
 
@@ -77,6 +89,7 @@ impl Solver {
     pub fn begin(&mut self, snapshot: &ContactSnapshot) {
         self.modes.begin(&snapshot.velocity);
         self.carried_s = 0.0;
+        self.slid = false;
         self.forces[..snapshot.count].copy_from_slice(&snapshot.forces[..snapshot.count]);
         self.points[..snapshot.count].copy_from_slice(&snapshot.points[..snapshot.count]);
         self.moved.fill(0.0);
@@ -136,9 +149,53 @@ impl Solver {
         part
     }
 
+    /// [`Solver::solve_once`], and again where it loses the tool.
+    ///
+    /// A hand knows the samples alone, and a thin tool that dents the tissue between three of them may lose them all sideways, while the
+    /// tissue between them is still there.
+    pub fn solve(
+        &mut self,
+        snapshot: &ContactSnapshot,
+        body: &Body,
+        friction: f32,
+        way: [&Pose; 2],
+        part: f32,
+    ) {
+        let pushed = !self.slid && self.pushing(snapshot.count).next().is_some();
+        if pushed {
+            self.before.0.copy_from_slice(&self.forces);
+            self.before.1.copy_from_slice(&self.moved);
+            self.before.2.copy_from_slice(&self.aim);
+        }
+        self.solve_once(snapshot, body, friction, way, part);
+        if pushed && self.pushing(snapshot.count).next().is_none() {
+            self.slid = true;
+            self.forces.copy_from_slice(&self.before.0);
+            self.moved.copy_from_slice(&self.before.1);
+            self.aim.copy_from_slice(&self.before.2);
+            self.solve_once(snapshot, body, friction, way, part);
+        }
+    }
+
+    /// Where contact with a sample is looked for: where it is, or, once all have slid off, where the tool has it since the step, as high as it is.
+    fn touched_at(&self, snapshot: &ContactSnapshot, body: &Body, at: usize, now: &Pose) -> Vector {
+        let point = self.place(snapshot, at);
+        let pose = match &snapshot.pose {
+            Some(pose) if self.slid && snapshot.forces[at] != Vector::ZERO => pose,
+            _ => return point,
+        };
+        let beside = now.transform_point(pose.inverse_transform_point(snapshot.points[at]));
+        let normal = body.nearest_at(now, beside).normal;
+        let plane = beside + normal * (point - beside).dot(normal);
+        match (beside - snapshot.points[at]).reject_from(normal).length() <= SLIDES_MM {
+            true => plane,
+            false => point,
+        }
+    }
+
     /// Forces with the tool at `now`, which was at `from` when the samples were where they are; a change of them moves samples by
     /// `part` of what it will.
-    pub fn solve(
+    fn solve_once(
         &mut self,
         snapshot: &ContactSnapshot,
         body: &Body,
@@ -152,7 +209,7 @@ impl Solver {
         self.nearest = f32::MAX;
         for at in 0..snapshot.count {
             let pushed = self.forces[at] != Vector::ZERO;
-            let point = self.place(snapshot, at);
+            let point = self.touched_at(snapshot, body, at, now);
             let outside = point.cmplt(low).any() || point.cmpgt(high).any();
             let tied = snapshot.ties[at].is_some();
             let held = snapshot.anchors[at].is_some() || tied;
@@ -195,7 +252,7 @@ impl Solver {
                 swept: true,
                 way_out: None,
             };
-            let (point, start) = (self.place(snapshot, at), self.points[at]);
+            let (point, start) = (self.touched_at(snapshot, body, at, now), self.points[at]);
             let mut contact = match &snapshot.ties[at] {
                 Some(tie) => pulling(tie, now, point),
                 None => pair.contact(point, start, snapshot.outward[at], force),
@@ -231,7 +288,7 @@ impl Solver {
             // A tie pulls the tool at its own end.
             self.points[at] = match &snapshot.ties[at] {
                 Some(tie) => now.transform_point(tie.place),
-                None => self.place(snapshot, at),
+                None => self.touched_at(snapshot, body, at, now),
             };
         }
         let m = snapshot.modes;

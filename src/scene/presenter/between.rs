@@ -10,7 +10,7 @@ use super::contact_response::ContactResponse;
 use super::extrapolation::{ToolPaths, VelocityExtrapolation};
 use super::led::LedGroups;
 use super::nodes::{Nodes, ResponseContext};
-use super::solves::{Drive, SolveKey, Solves};
+use super::solves::{Drive, Moves, SolveKey, Solves};
 use super::touched::TouchedTissue;
 use crate::contact::problem::Change;
 use crate::contact::{Compliance, ContactProblem, Past, State};
@@ -249,7 +249,7 @@ impl Between {
             self.extrapolation
                 .follow(nodes, fields, moved, &mut self.free);
         }
-        let make = |q: &mut [f32]| -> Result<bool> {
+        let make = |q: &mut [f32]| -> Result<Moves> {
             let kappa = scene.integrator.over(tau.max(AT_ONCE_S)).kappa();
             // As many as before.
             self.inertial_compliance.clear();
@@ -268,7 +268,7 @@ impl Between {
                 Drive::Nodes(now) => {
                     let near = !now.is_empty() || !self.nodes.then.is_empty();
                     if tau <= AT_ONCE_S || !near {
-                        return Ok(false);
+                        return Ok(Moves::Nothing);
                     }
                     let means = ResponseContext {
                         isa: self.isa,
@@ -283,53 +283,67 @@ impl Between {
                         forces: &self.nodes.change,
                     };
                     response.add(change, &mut self.natural, false, q)?;
-                    return Ok(true);
+                    return Ok(Moves::Pushed);
                 }
             };
-            self.problem.begin_frame(tools, rest, last)?;
-            self.problem.tied.step_s = tau as f32;
-            let state = State {
-                rest,
-                u: &self.free,
-                start: last,
-            };
-            if tau <= AT_ONCE_S || !self.problem.is_near(state)? {
-                return Ok(false);
-            }
-            let compliance = Compliance::at_rest(
-                prior,
-                &self.held,
-                Some((&corrections.space, &self.inertial_compliance)),
-            );
-            let change = self.problem.solve_between(compliance, state)?;
-            response.add(change, &mut self.natural, false, q)?;
-            // As in a step: a quick or thin tool that has lost the contact is pressed again about where the tissue has come to.
-            for _ in 0..MORE_PRESSES {
-                if !self.problem.ways.may_lose() || self.problem.work.is_spent() {
-                    break;
-                }
-                let means = (self.isa, &self.pool, &**prior);
-                let where_touched = (self.problem.surface.samples.nodes(), &*self.held);
-                let touched = &mut self.touched;
-                touched.place(means, where_touched, &self.free, Some(q))?;
-                if !touched.has_lost(&mut self.problem, rest, last) {
-                    break;
-                }
+            // Where the tissue goes on as it went a quick or thin tool may have lost it, as often as it is pressed: then it stays where the step left it.
+            for (free, pushed) in [(&*self.free, Moves::Pushed), (last, Moves::Stays)] {
+                self.problem.begin_frame(tools, rest, last)?;
+                self.problem.tied.step_s = tau as f32;
                 let state = State {
                     rest,
-                    u: touched.displacement(),
+                    u: free,
                     start: last,
                 };
+                if tau <= AT_ONCE_S || !self.problem.is_near(state)? {
+                    return Ok(Moves::Nothing);
+                }
+                let compliance = Compliance::at_rest(
+                    prior,
+                    &self.held,
+                    Some((&corrections.space, &self.inertial_compliance)),
+                );
                 let change = self.problem.solve_between(compliance, state)?;
-                response.add(change, &mut self.natural, true, q)?;
+                response.add(change, &mut self.natural, false, q)?;
+                // As in a step: a quick or thin tool that has lost the contact is pressed again about where the tissue has come to.
+                for press in 0..=MORE_PRESSES {
+                    if !self.problem.ways.may_lose() || self.problem.work.is_spent() {
+                        return Ok(pushed);
+                    }
+                    let means = (self.isa, &self.pool, &**prior);
+                    let nodes = (self.problem.surface.samples.nodes(), &*self.held);
+                    self.touched.place(means, nodes, free, Some(q))?;
+                    if !(self.touched).has_lost(&mut self.problem, rest, last) {
+                        return Ok(pushed);
+                    }
+                    if press == MORE_PRESSES {
+                        break;
+                    }
+                    let u = self.touched.displacement();
+                    let change = (self.problem).solve_between(compliance, State { u, ..state })?;
+                    response.add(change, &mut self.natural, true, q)?;
+                }
             }
-            Ok(true)
+            Ok(Moves::Stays)
         };
         let place = match known {
             Some(place) => place,
             None => solves.make(&question, prior.width(), make)?,
         };
         self.shown = Some(place);
+        if solves.stays(place) {
+            let free = self.free.as_chunks_mut::<3>().0;
+            for &node in self
+                .problem
+                .surface
+                .samples
+                .nodes()
+                .iter()
+                .chain(view.region)
+            {
+                free[node as usize] = last.as_chunks::<3>().0[node as usize];
+            }
+        }
         let moves = solves.moves(place);
         if let Some(q) = moves {
             decode_rows(

@@ -32,6 +32,17 @@ pub(super) struct SolveKey<'a> {
     pub drive: Drive<'a>,
 }
 
+/// What contact does to the tissue of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Moves {
+    #[default]
+    Nothing,
+    /// It moves tissue that goes on from the step.
+    Pushed,
+    /// It moves tissue that stays where the step left it.
+    Stays,
+}
+
 /// A solve, and what it followed from.
 #[derive(Default, HeldBytes)]
 struct Solve {
@@ -44,9 +55,9 @@ struct Solve {
     by_tools: bool,
     tools: Vec<Tool>,
     nodes: ContactSet,
-    /// Whether contact moves anything, ...
-    pushed: bool,
-    /// ... and what it moves.
+    #[held(skip)]
+    moves: Moves,
+    /// What contact moves.
     coordinates: Vec<f32>,
 }
 
@@ -112,10 +123,15 @@ impl Solves {
     /// What the contact of an answer moves, in the coordinates of the linear response; none where it moves nothing.
     pub(super) fn moves(&self, place: usize) -> Option<&[f32]> {
         let solve = &self.kept[place];
-        solve.pushed.then_some(&*solve.coordinates)
+        (solve.moves != Moves::Nothing).then_some(&*solve.coordinates)
     }
 
-    /// Solves for a key, in place of the older of the two solves: `make` fills `width` coordinates and returns whether contact moves anything.
+    /// Whether the tissue of an answer stays where the step left it, but for what contact moves.
+    pub(super) fn stays(&self, place: usize) -> bool {
+        self.kept[place].moves == Moves::Stays
+    }
+
+    /// Solves for a key, in place of the older of the two solves: `make` fills `width` coordinates and returns what contact does.
     ///
     /// # Errors
     /// What `make` gives, [`crate::Error::OutOfMemory`]; that answer is gone then.
@@ -123,7 +139,7 @@ impl Solves {
         &mut self,
         question: &SolveKey<'_>,
         width: usize,
-        make: impl FnOnce(&mut [f32]) -> Result<bool>,
+        make: impl FnOnce(&mut [f32]) -> Result<Moves>,
     ) -> Result<usize> {
         let place = self.next;
         let solve = &mut self.kept[place];
@@ -132,7 +148,7 @@ impl Solves {
             solve.coordinates = memory::zeros(width, WHAT)?;
         }
         solve.take(question)?;
-        solve.pushed = make(&mut solve.coordinates)?;
+        solve.moves = make(&mut solve.coordinates)?;
         solve.step = Some(question.step);
         self.next = 1 - place;
         #[cfg(test)]

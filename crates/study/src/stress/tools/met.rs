@@ -13,9 +13,9 @@ const MOST_MM: f64 = 1.0;
 const GOAL_MM: f64 = 0.3;
 /// Frames that are shown between two steps.
 const FRAMES: usize = 2;
-/// A hand may miss the tissue for so many calls, ms, and for more in one of so many places: it knows the samples that lay ahead of it.
+/// A hand may miss the tissue for so many calls, ms, and for more in one place of so many: where a step loses the tool, the hand does.
 const MISSED: usize = 5;
-const HANDS: usize = 10;
+const HANDS: usize = 100;
 /// A tool so far beneath the surface at rest must be met, mm.
 const BENEATH_MM: f32 = 0.6;
 /// Part of a step that passes before its state reaches the hand.
