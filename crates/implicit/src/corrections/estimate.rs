@@ -47,8 +47,9 @@ impl ImplicitSolver {
 
     /// What a further iteration would move, from the last one's step and by how much it lessened the residual, mm.
     pub(super) fn remaining(&mut self, env: Env<'_>, g: &[f32], before: f64) -> Result<f32> {
-        let moved = passes::square(env, &self.d, &mut self.partial)? / (self.d.len() / 3) as f64;
-        let left = self.size(env, g)? / before.max(f64::MIN_POSITIVE);
+        let moved = passes::square(env, &self.fields.d, &mut self.balance.partial)?
+            / (self.fields.d.len() / 3) as f64;
+        let left = self.balance.size(env, g)? / before.max(f64::MIN_POSITIVE);
         Ok((moved.sqrt() * left) as f32)
     }
 }

@@ -27,20 +27,20 @@ impl ImplicitSolver {
         let is_free = input.load.is_none() && !pushes;
         if is_free && rests(input.last) && rests(input.before) && (input.still || self.rests()) {
             next.fill(0.0);
-            self.load.clear();
+            self.balance.load.clear();
             self.finish(context, input, next)?;
             report.min_det = 1.0;
             return Ok(report);
         }
         let _awake = context.pool.keep_awake();
-        self.nodes.clear();
+        self.balance.nodes.clear();
         self.preconditioner.prescribe(context.env(), &[])?;
         self.expect(context, input)?;
         // Nothing is prescribed: the pairs of the whole body hold.
         self.memory.mask(&[]);
         self.prepare(context, input)?;
-        let mut u = std::mem::take(&mut self.u);
-        let mut g = std::mem::take(&mut self.g);
+        let mut u = std::mem::take(&mut self.fields.u);
+        let mut g = std::mem::take(&mut self.fields.g);
         // A body of which a part has been let go has other natural modes.
         let swings = context.held.let_go == 0;
         let result = match swings {
@@ -60,7 +60,7 @@ impl ImplicitSolver {
             self.next.min_det = report.min_det;
             self.estimate(&mut report);
         }
-        (self.u, self.g) = (u, g);
+        (self.fields.u, self.fields.g) = (u, g);
         result.map(|()| report)
     }
 
@@ -84,15 +84,23 @@ impl ImplicitSolver {
         self.free.ready(context)?;
         let still = input.last;
         // Internal forces of the last state: what the modes swing about is not linear elasticity but the law.
-        let (det, _) = self.residual(context, [still, still, still], g, report)?;
+        let (det, _) = self
+            .balance
+            .residual(context, [still, still, still], g, report)?;
         self.measure(context, input, g)?;
         let env = context.env();
         // What the modes lack under BDF2 goes into the inertia of the step, ...
         self.free.give(|mode| mode.forced(h, kappa));
         self.preconditioner
-            .of_natural(env, &self.free.values, &mut self.d)?;
+            .of_natural(env, &self.free.values, &mut self.fields.d)?;
         let masses = &env.body.mass;
-        for (i, (drift, forced)) in self.drift.iter_mut().zip(&self.d).enumerate() {
+        for (i, (drift, forced)) in self
+            .balance
+            .drift
+            .iter_mut()
+            .zip(&self.fields.d)
+            .enumerate()
+        {
             *drift -= masses[i / 3] * forced;
         }
         // ... and into the velocities at its end.
@@ -101,17 +109,23 @@ impl ImplicitSolver {
             .of_natural(env, &self.free.values, &mut self.free.faster)?;
         self.free.give(|mode| mode.after(h).0 - mode.place);
         self.preconditioner
-            .of_natural(env, &self.free.values, &mut self.d)?;
+            .of_natural(env, &self.free.values, &mut self.fields.d)?;
         // The guess: the last state moved along the modes as their oscillators do.
-        passes::shorten(env, input.last, &self.d, 1.0, u)?;
+        passes::shorten(env, input.last, &self.fields.d, 1.0, u)?;
         self.add_gravity(context, input, u)?;
         self.lift(context, input, Some(input.last), u)?;
         // A guess that inverts elements where the last state did not is given up for the last state.
         let lost = det.is_nan() || det < SMALLEST_DET;
-        let mut det = self.residual(context, [input.last, u, u], g, report)?.0;
+        let mut det = self
+            .balance
+            .residual(context, [input.last, u, u], g, report)?
+            .0;
         if !lost && (det.is_nan() || det < SMALLEST_DET) {
             u.copy_from_slice(input.last);
-            det = self.residual(context, [input.last, u, u], g, report)?.0;
+            det = self
+                .balance
+                .residual(context, [input.last, u, u], g, report)?
+                .0;
         }
         report.parts = 1;
         self.relax(context, input, det, u, g, report)?;
@@ -133,10 +147,16 @@ impl ImplicitSolver {
         self.lift(context, input, Some(input.last), u)?;
         self.move_freely(env)?;
         self.settle(env, u)?;
-        let mut det = self.residual(context, [input.last, u, u], g, report)?.0;
+        let mut det = self
+            .balance
+            .residual(context, [input.last, u, u], g, report)?
+            .0;
         if det.is_nan() || det < SMALLEST_DET {
             u.copy_from_slice(input.last);
-            det = self.residual(context, [input.last, u, u], g, report)?.0;
+            det = self
+                .balance
+                .residual(context, [input.last, u, u], g, report)?
+                .0;
         }
         report.parts = 1;
         self.relax(context, input, det, u, g, report)?;
@@ -159,8 +179,11 @@ impl ImplicitSolver {
             for (u, last) in u.iter_mut().zip(input.last) {
                 *u = kept * last;
             }
-            report.min_det = self.residual(context, [input.last, u, u], g, report)?.0;
-            self.stand();
+            report.min_det = self
+                .balance
+                .residual(context, [input.last, u, u], g, report)?
+                .0;
+            self.balance.stand();
         }
         Ok(())
     }
@@ -170,12 +193,12 @@ impl ImplicitSolver {
         let env = context.env();
         let known = if input.still { 0.0 } else { 1.0 };
         let weighted = |solver: &mut ImplicitSolver, field: &[f32], scale: f32| {
-            for (i, (q, value)) in solver.q.iter_mut().zip(field).enumerate() {
+            for (i, (q, value)) in solver.fields.q.iter_mut().zip(field).enumerate() {
                 *q = scale * env.body.mass[i / 3] * value;
             }
-            mask_held(&env.held.is, &mut solver.q);
+            mask_held(&env.held.is, &mut solver.fields.q);
             let (preconditioner, values) = (&mut solver.preconditioner, &mut solver.free.values);
-            preconditioner.on_natural(env, &solver.q, values)
+            preconditioner.on_natural(env, &solver.fields.q, values)
         };
         weighted(self, input.last, 1.0)?;
         self.free.take(|mode| &mut mode.place);
@@ -188,10 +211,11 @@ impl ImplicitSolver {
         measured?;
         self.free.take(|mode| &mut mode.velocity);
         // The drift has the masses in it.
-        self.q.copy_from_slice(&self.drift);
-        mask_held(&env.held.is, &mut self.q);
+        self.fields.q.copy_from_slice(&self.balance.drift);
+        mask_held(&env.held.is, &mut self.fields.q);
         let values = &mut self.free.values;
-        self.preconditioner.on_natural(env, &self.q, values)?;
+        self.preconditioner
+            .on_natural(env, &self.fields.q, values)?;
         self.free.take(|mode| &mut mode.drift);
         let values = &mut self.free.values;
         self.preconditioner.on_natural(env, g, values)?;
@@ -201,9 +225,10 @@ impl ImplicitSolver {
             mode.load = 0.0;
         }
         if self.mean_load(input) {
-            mask_held(&env.held.is, &mut self.q);
+            mask_held(&env.held.is, &mut self.fields.q);
             let values = &mut self.free.values;
-            self.preconditioner.on_natural(env, &self.q, values)?;
+            self.preconditioner
+                .on_natural(env, &self.fields.q, values)?;
             self.free.take(|mode| &mut mode.load);
         }
         Ok(())
@@ -215,7 +240,8 @@ impl ImplicitSolver {
         let masses = &context.corrections.body.mass;
         for i in 0..next.len() {
             self.next.velocity[i] += self.free.faster[i];
-            self.next.inertia[i] = masses[i / 3] * kappa * (next[i] - last[i]) + self.drift[i];
+            self.next.inertia[i] =
+                masses[i / 3] * kappa * (next[i] - last[i]) + self.balance.drift[i];
         }
     }
 }

@@ -55,6 +55,7 @@ impl GravityResponse {
             let mut u = memory::zeros(len, WHAT)?;
             let mut g = memory::zeros(len, WHAT)?;
             for (at, (drift, mass)) in solver
+                .balance
                 .drift
                 .iter_mut()
                 .zip(&env.body.mass_of_dof)
@@ -64,12 +65,13 @@ impl GravityResponse {
             }
             solver.memory.clear();
             let mut report = Report::default();
-            let (det, _) = solver.residual(context, [&zero, &u, &u], &mut g, &mut report)?;
-            let drift = std::mem::take(&mut solver.drift);
-            g.copy_from_slice(&drift);
+            let (det, _) =
+                solver
+                    .balance
+                    .residual(context, [&zero, &u, &u], &mut g, &mut report)?;
+            g.copy_from_slice(&solver.balance.drift);
             mask_held(&env.held.is, &mut g);
             solver.preconditioner.move_natural(env, &g)?;
-            solver.drift = drift;
             let mut by_modes = memory::zeros(len, WHAT)?;
             solver.preconditioner.decode(env, &mut by_modes)?;
             mask_held(&env.held.is, &mut by_modes);

@@ -53,8 +53,8 @@ impl ImplicitSolver {
         } = context.time_step.integrator;
         let (bdf2, alpha) = (Differences::new(step_s, input), damping_per_s as f32);
         let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
-        let len = self.drift.len();
-        let drift = Parts::new(&mut self.drift);
+        let len = self.balance.drift.len();
+        let drift = Parts::new(&mut self.balance.drift);
         passes::each(env.pool, len, 6, |range, _| {
             // SAFETY: this part belongs to this piece alone.
             let drift = unsafe { drift.part(range.start, range.len()) };
@@ -79,7 +79,7 @@ impl ImplicitSolver {
         next: &[f32],
     ) -> Result<()> {
         self.memory.begin();
-        self.load.clear();
+        self.balance.load.clear();
         self.finish(context, input, next)
     }
 
@@ -109,7 +109,7 @@ impl ImplicitSolver {
         let (bdf2, alpha) = (Differences::new(step_s, input), damping_per_s as f32);
         let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
         let time = step_s as f32;
-        let mut sums = passes::Sums::new(&mut self.partial, next.len(), 2);
+        let mut sums = passes::Sums::new(&mut self.balance.partial, next.len(), 2);
         let parts = sums.parts();
         let own = &mut self.next;
         let outputs = [

@@ -132,18 +132,20 @@ impl ImplicitSolver {
     /// Where the body comes to rest in a step with the boundary of `context`, over [`TRIAL_MM`].
     fn answer(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<Vec<f32>> {
         let env = context.env();
-        self.nodes.clear();
+        self.balance.nodes.clear();
         self.preconditioner.prescribe(env, &[])?;
         self.expect(context, input)?;
         self.memory.mask(&[]);
         self.memory.clear();
-        self.drift.fill(0.0);
+        self.balance.drift.fill(0.0);
         let mut u = memory::zeros(input.last.len(), WHAT)?;
         let mut g = memory::zeros(input.last.len(), WHAT)?;
         // Only the group is displaced at first; the iterations find what the body does between it and what is held.
         context.held.put(&mut u);
         let mut report = Report::default();
-        let (det, _) = self.residual(context, [input.last, &u, &u], &mut g, &mut report)?;
+        let (det, _) = self
+            .balance
+            .residual(context, [input.last, &u, &u], &mut g, &mut report)?;
         self.relax(context, input, det, &mut u, &mut g, &mut report)?;
         u.iter_mut().for_each(|value| *value /= TRIAL_MM);
         Ok(u)
@@ -152,7 +154,7 @@ impl ImplicitSolver {
     /// What loads and what is held ask of a step, before it begins.
     pub(super) fn expect(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<()> {
         self.stand_on(context.held.let_go);
-        if self.let_go_before != self.let_go {
+        if self.groups.before != self.groups.now {
             // The pairs are those of another boundary, also where the step is made again.
             self.clear_pairs();
         }
@@ -238,8 +240,8 @@ impl ImplicitSolver {
         let mut u = memory::zeros(len, WHAT)?;
         let mut products = [memory::zeros(len, WHAT)?, memory::zeros(len, WHAT)?];
         let mut on_modes = memory::zeros(coarse, WHAT)?;
-        self.nodes.clear();
-        self.drift.fill(0.0);
+        self.balance.nodes.clear();
+        self.balance.drift.fill(0.0);
         for (at, (lift, field)) in fields.iter().enumerate() {
             for (node, own) in u.as_chunks_mut::<3>().0.iter_mut().enumerate() {
                 let part = if env.held.is[node] { 0.0 } else { TRIAL_MM };
@@ -247,7 +249,8 @@ impl ImplicitSolver {
             }
             let [stiff, heavy] = &mut products;
             // Over so little the residual is linear: it is `(K + kappa M) u`, and the mass's part comes off below.
-            self.residual(context, [&zero, &u, &u], stiff, &mut Report::default())?;
+            self.balance
+                .residual(context, [&zero, &u, &u], stiff, &mut Report::default())?;
             for (i, (stiff, heavy)) in stiff.iter_mut().zip(&mut *heavy).enumerate() {
                 *heavy = env.body.mass_of_dof[i] * u[i] / TRIAL_MM;
                 *stiff = *stiff / TRIAL_MM - kappa * *heavy;

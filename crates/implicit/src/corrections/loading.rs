@@ -9,22 +9,26 @@ impl ImplicitSolver {
     /// Takes the loads of the step: those at its end off the drift.
     pub(super) fn take_load(&mut self, input: &Input<'_>, step_s: f32) -> Result<()> {
         if input.load.is_none() && self.relaxing.is_none() {
-            self.load.clear();
+            self.balance.load.clear();
             return Ok(());
         }
-        memory::fit(&mut self.load, self.drift.len(), "the loads of a scene")?;
-        self.load.resize(self.drift.len(), 0.0);
+        memory::fit(
+            &mut self.balance.load,
+            self.balance.drift.len(),
+            "the loads of a scene",
+        )?;
+        self.balance.load.resize(self.balance.drift.len(), 0.0);
         let ahead = if input.still { 0.0 } else { step_s };
         let (last, velocity) = (input.last, &self.motion.velocity);
         let there = |at: usize| last[at] + ahead * velocity[at];
         match &input.load {
-            Some(load) => load.evaluate(1, input.rest, there, &mut self.load),
-            None => self.load.fill(0.0),
+            Some(load) => load.evaluate(1, input.rest, there, &mut self.balance.load),
+            None => self.balance.load.fill(0.0),
         }
         if let Some(relaxing) = &self.relaxing {
-            relaxing.add(input.way[1], &mut self.load);
+            relaxing.add(input.way[1], &mut self.balance.load);
         }
-        for (drift, load) in self.drift.iter_mut().zip(&self.load) {
+        for (drift, load) in self.balance.drift.iter_mut().zip(&self.balance.load) {
             *drift -= load;
         }
         Ok(())
@@ -33,14 +37,14 @@ impl ImplicitSolver {
     /// The mean load over the step into `q`; false where there is none.
     pub(super) fn mean_load(&mut self, input: &Input<'_>) -> bool {
         match &input.load {
-            Some(load) => load.evaluate(0, input.rest, |at| input.last[at], &mut self.q),
+            Some(load) => load.evaluate(0, input.rest, |at| input.last[at], &mut self.fields.q),
             None if self.relaxing.is_none() => return false,
-            None => self.q.fill(0.0),
+            None => self.fields.q.fill(0.0),
         }
         if let Some(relaxing) = &self.relaxing {
-            relaxing.add(input.way[0], &mut self.q);
+            relaxing.add(input.way[0], &mut self.fields.q);
         }
-        for (mean, end) in self.q.iter_mut().zip(&self.load) {
+        for (mean, end) in self.fields.q.iter_mut().zip(&self.balance.load) {
             *mean = 0.5 * (*mean + end);
         }
         true
@@ -48,8 +52,12 @@ impl ImplicitSolver {
 
     /// Takes the loads off the inertia of the state being made, which keeps them.
     pub(super) fn leave_load(&mut self) -> Result<()> {
-        memory::replace(&mut self.next.load, &self.load, "the loads of a scene")?;
-        for (inertia, load) in self.next.inertia.iter_mut().zip(&self.load) {
+        memory::replace(
+            &mut self.next.load,
+            &self.balance.load,
+            "the loads of a scene",
+        )?;
+        for (inertia, load) in self.next.inertia.iter_mut().zip(&self.balance.load) {
             *inertia -= load;
         }
         Ok(())

@@ -7,6 +7,7 @@
 //! [`Corrections`] is what a model shares between scenes, made when the first scene asks for it; [`ImplicitSolver`] is a scene's own.
 //! Displacements mm, forces µN, masses g, times s.
 
+mod balance;
 mod body;
 mod boundary;
 mod cut;
@@ -14,6 +15,7 @@ mod cut_groups;
 mod cut_loads;
 mod estimate;
 mod far;
+mod fields;
 mod free;
 mod gravity;
 mod gravity_columns;

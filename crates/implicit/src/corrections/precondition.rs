@@ -9,12 +9,14 @@
 
 mod loaded;
 mod near;
+mod parts;
 mod response;
 
+use self::parts::{Basis, Galerkin, Modal, PrescribedContact, WholeLevel};
 use super::body::Body;
 use super::boundary::Held;
 use super::time_step::TimeStep;
-use super::whole::{WholeModes, WholeSolve};
+use super::whole::WholeModes;
 use crate::error::{Error, Result};
 use crate::kernels::contact::{ContactFactor, subtract_gram};
 use crate::kernels::project::{project_field, row_dots};
@@ -48,56 +50,20 @@ pub struct Env<'a> {
 /// The preconditioner for one set of prescribed nodes, and its buffers.
 #[derive(HeldBytes)]
 pub struct Preconditioner {
-    /// What inertia takes off the static compliance, by natural mode: `(1/w² - 1/(w² + kappa)) / m`, mm/mN.
-    inertial_compliance: Vec<f32>,
-    /// `1 / (m (w² + kappa))` of each natural mode, mm/µN.
-    moved_freely: Vec<f32>,
-    /// Where each block of the basis begins in the coordinates.
-    pub(super) starts: Vec<usize>,
-    /// All nodes, as rows of the basis.
-    plan: RowPlan,
-    /// Nodes of the domain, which tools touch.
-    domain: RowPlan,
-    pub(super) domain_nodes: Vec<u32>,
-    /// Contact dofs with columns, as rows of the prior's tables.
-    dofs: Vec<u32>,
-    /// Their columns, one for three of those.
-    columns: Vec<u32>,
-    /// Prescribed nodes, ascending.
-    nodes: Vec<u32>,
-    /// `A_k,CC`.
-    compliance: ContactFactor,
-    /// `R^-T Phi_C [3m,r]` with `R^T R = A_k,CC`.
-    whitened: Vec<f64>,
-    /// A row of what inertia takes off the compliance, and the natural modes at the contact by mode `[n,3m]`.
-    lost: Vec<f32>,
-    natural: Vec<f32>,
-    /// Factor of `Psi^T (K + kappa M) Psi` with the contact held, and `Phi^T (K + kappa M) Phi` without contact `[r,r]`.
-    galerkin: ContactFactor,
-    galerkin_free: Vec<f64>,
-    /// The latter in f32, for products, and its inverse: local iterations solve it many times and hold no contact in it.
-    galerkin_narrow: Vec<f32>,
-    galerkin_inverse: Vec<f32>,
-    /// Rows of the tables that degrees of freedom have.
-    stored: Vec<u32>,
-    /// Scratch of what the compliance is gathered with.
-    widened: Vec<f32>,
+    modal: Modal,
+    pub(super) basis: Basis,
+    contact: PrescribedContact,
+    galerkin: Galerkin,
     /// `U^T r` on the way down, `U^T z` on the way up `[Q]`: every product with a field goes through here.
     pub(super) coordinates: Vec<f32>,
     /// `Phi^T r` and what the coarse level makes of it, in amplitudes of the modes `[r]`.
     on_modes: Vec<f32>,
     solved: Vec<f32>,
-    /// Displacements at the prescribed degrees of freedom, mm, and the forces that belong to them, mN.
-    at_contact: Vec<f32>,
-    forces: Vec<f32>,
-    /// Made at the first step with a load.
-    whole: Option<Box<WholeSolve>>,
-    /// Whether the step has loads: then the whole modes are part of the coarse level.
-    has_load: bool,
-    /// The support groups that were let go when it was made.
-    let_go: u64,
+    /// Prescribed nodes, ascending.
+    nodes: Vec<u32>,
     /// The factors are of `nodes`.
     ready: bool,
+    whole: WholeLevel,
 }
 
 impl Preconditioner {
@@ -120,51 +86,60 @@ impl Preconditioner {
         };
         let galerkin_free = env.space.galerkin(kappa)?;
         Ok(Preconditioner {
-            inertial_compliance: env.space.inertial_compliance(kappa)?,
-            moved_freely: env.space.moved_freely(kappa)?,
-            starts: env.prior.basis_starts()?,
-            plan: RowPlan::try_region(&env.prior.basis(), &nodes, false)?,
-            domain: RowPlan::try_region(&env.prior.basis(), &domain_nodes, false)?,
-            domain_nodes,
-            dofs: memory::room(dofs, WHAT)?,
-            columns: memory::room(dofs / 3, WHAT)?,
-            nodes,
-            compliance: ContactFactor::try_with_capacity(room)?,
-            whitened: memory::room(room * count, WHAT)?,
-            lost: memory::room(room, WHAT)?,
-            natural: memory::room(room * env.space.natural_count(), WHAT)?,
-            galerkin: ContactFactor::try_with_capacity(count)?,
-            galerkin_narrow: {
-                let narrow = galerkin_free.iter().map(|&value| value as f32);
-                memory::collected(galerkin_free.len(), narrow, WHAT)?
+            modal: Modal {
+                inertial_compliance: env.space.inertial_compliance(kappa)?,
+                moved_freely: env.space.moved_freely(kappa)?,
             },
-            galerkin_free,
-            galerkin_inverse: env.space.galerkin_inverse(kappa, env.isa)?,
-            stored: Vec::new(),
-            widened: memory::zeros(6 * env.prior.widest_block(), WHAT)?,
+            basis: Basis {
+                starts: env.prior.basis_starts()?,
+                plan: RowPlan::try_region(&env.prior.basis(), &nodes, false)?,
+                domain: RowPlan::try_region(&env.prior.basis(), &domain_nodes, false)?,
+                domain_nodes,
+            },
+            contact: PrescribedContact {
+                dofs: memory::room(dofs, WHAT)?,
+                columns: memory::room(dofs / 3, WHAT)?,
+                compliance: ContactFactor::try_with_capacity(room)?,
+                whitened: memory::room(room * count, WHAT)?,
+                lost: memory::room(room, WHAT)?,
+                natural: memory::room(room * env.space.natural_count(), WHAT)?,
+                moved: memory::room(room, WHAT)?,
+                forces: memory::room(room, WHAT)?,
+                stored: Vec::new(),
+                widened: memory::zeros(6 * env.prior.widest_block(), WHAT)?,
+            },
+            galerkin: Galerkin {
+                held: ContactFactor::try_with_capacity(count)?,
+                narrow: {
+                    let narrow = galerkin_free.iter().map(|&value| value as f32);
+                    memory::collected(galerkin_free.len(), narrow, WHAT)?
+                },
+                free: galerkin_free,
+                inverse: env.space.galerkin_inverse(kappa, env.isa)?,
+            },
             coordinates: memory::zeros(env.prior.width(), WHAT)?,
             on_modes: memory::zeros(count, WHAT)?,
             solved: memory::zeros(count, WHAT)?,
-            at_contact: memory::room(room, WHAT)?,
-            forces: memory::room(room, WHAT)?,
-            whole: None,
-            has_load: false,
-            let_go: 0,
+            nodes,
             ready: false,
+            whole: WholeLevel::default(),
         })
     }
 
     /// Makes room for `order` prescribed degrees of freedom; contacts of up to [`ROOM`] have it.
     fn reserve(&mut self, order: usize, count: usize) -> Result<()> {
-        self.compliance.reserve(order)?;
-        let more = (order * count).saturating_sub(self.whitened.len());
-        memory::reserve(&mut self.whitened, more, WHAT)?;
-        self.whitened.resize(order * count, 0.0);
+        self.contact.compliance.reserve(order)?;
+        let more = (order * count).saturating_sub(self.contact.whitened.len());
+        memory::reserve(&mut self.contact.whitened, more, WHAT)?;
+        self.contact.whitened.resize(order * count, 0.0);
         for (list, wanted) in [
-            (&mut self.natural, order * self.inertial_compliance.len()),
-            (&mut self.lost, order),
-            (&mut self.at_contact, order),
-            (&mut self.forces, order),
+            (
+                &mut self.contact.natural,
+                order * self.modal.inertial_compliance.len(),
+            ),
+            (&mut self.contact.lost, order),
+            (&mut self.contact.moved, order),
+            (&mut self.contact.forces, order),
         ] {
             let more = wanted.saturating_sub(list.len());
             memory::reserve(list, more, WHAT)?;
@@ -181,35 +156,44 @@ impl Preconditioner {
         self.ready = false;
         self.nodes.clear();
         self.nodes.extend_from_slice(nodes);
-        self.columns.clear();
-        self.dofs.clear();
+        self.contact.columns.clear();
+        self.contact.dofs.clear();
         for &node in nodes {
             if let Some((column, true)) = env.prior.column_for(&env.held.is, node) {
-                self.columns.push(column as u32);
-                self.dofs
+                self.contact.columns.push(column as u32);
+                self.contact
+                    .dofs
                     .extend([0, 1, 2].map(|axis| 3 * column as u32 + axis));
             }
         }
-        let (order, count) = (self.dofs.len(), env.space.count());
+        let (order, count) = (self.contact.dofs.len(), env.space.count());
         let bad = |error: crate::kernels::contact::FactorError| {
             Error::bundle("corrections.safetensors", error.to_string())
         };
         self.reserve(order, count)?;
         if order > 0 {
-            for (at, &dof) in self.dofs.iter().enumerate() {
+            for (at, &dof) in self.contact.dofs.iter().enumerate() {
                 let own = env.space.at_contact(dof as usize);
-                for (mode, value) in own[..self.inertial_compliance.len()].iter().enumerate() {
-                    self.natural[mode * order + at] = *value;
+                for (mode, value) in own[..self.modal.inertial_compliance.len()]
+                    .iter()
+                    .enumerate()
+                {
+                    self.contact.natural[mode * order + at] = *value;
                 }
-                for (to, &from) in self.whitened[at * count..][..count].iter_mut().zip(own) {
+                for (to, &from) in self.contact.whitened[at * count..][..count]
+                    .iter_mut()
+                    .zip(own)
+                {
                     *to = f64::from(from);
                 }
             }
-            let (columns, widened) = (&self.columns, &mut self.widened);
-            let (inertial_compliance, natural) = (&self.inertial_compliance, &self.natural);
-            let lost = &mut self.lost;
-            self.compliance
-                .factor(env.isa, &self.dofs, |upper| {
+            let (columns, widened) = (&self.contact.columns, &mut self.contact.widened);
+            let (inertial_compliance, natural) =
+                (&self.modal.inertial_compliance, &self.contact.natural);
+            let lost = &mut self.contact.lost;
+            self.contact
+                .compliance
+                .factor(env.isa, &self.contact.dofs, |upper| {
                     env.prior.gather_compliance(columns, upper, widened);
                     for (at, row) in upper.chunks_exact_mut(order).enumerate() {
                         lose(inertial_compliance, natural, at, lost);
@@ -219,17 +203,20 @@ impl Preconditioner {
                     }
                 })
                 .map_err(bad)?;
-            self.compliance.whiten(env.isa, count, &mut self.whitened);
+            self.contact
+                .compliance
+                .whiten(env.isa, count, &mut self.contact.whitened);
         }
-        let (whitened, free) = (&self.whitened, &self.galerkin_free);
+        let (whitened, free) = (&self.contact.whitened, &self.galerkin.free);
         let rows = env.space.rows();
-        let less = self.galerkin.factor(env.isa, rows, |upper| {
+        let less = self.galerkin.held.factor(env.isa, rows, |upper| {
             upper.copy_from_slice(free);
             subtract_gram(env.isa, whitened, count, 1e3, upper);
         });
         if less.is_err() {
             // The contact takes more than there is, by what the tables and a short step leave out: the whole is positive, and does.
             self.galerkin
+                .held
                 .factor(env.isa, rows, |upper| upper.copy_from_slice(free))
                 .map_err(bad)?;
         }
@@ -242,11 +229,18 @@ impl Preconditioner {
         let (isa, pool) = (env.isa, env.pool);
         let basis = env.prior.basis();
         // Down to coordinates once, the coarse level there, and up once; the diagonal level is added to the field.
-        project_field(isa, pool, &basis, &self.starts, r, &mut self.coordinates)?;
+        project_field(
+            isa,
+            pool,
+            &basis,
+            &self.basis.starts,
+            r,
+            &mut self.coordinates,
+        )?;
         let whole = self.whole_modes(env);
         self.coarse(env, whole.map(|modes| (modes, r)))?;
-        decode_rows(isa, pool, &basis, &self.plan, &self.coordinates, z)?;
-        if let (Some(modes), Some(solve)) = (whole, &self.whole) {
+        decode_rows(isa, pool, &basis, &self.basis.plan, &self.coordinates, z)?;
+        if let (Some(modes), Some(solve)) = (whole, &self.whole.solve) {
             solve.add(env.compute(), modes, z)?;
         }
         let blocks = env.time_step.inverse_blocks.iter();
@@ -281,14 +275,14 @@ impl Preconditioner {
             &self.coordinates,
             &mut self.on_modes,
         )?;
-        if let (Some((modes, r)), Some(own)) = (whole, &mut self.whole) {
+        if let (Some((modes, r)), Some(own)) = (whole, &mut self.whole.solve) {
             own.solve(env.compute(), modes, r, &self.on_modes)?;
         }
-        if !self.dofs.is_empty() {
+        if !self.contact.dofs.is_empty() {
             self.contact_work(env)?;
         }
         self.solve_coarse(env);
-        if let (Some(_), Some(own)) = (whole, &self.whole) {
+        if let (Some(_), Some(own)) = (whole, &self.whole.solve) {
             own.take_off(&mut self.solved);
         }
         self.spread(env)
@@ -297,27 +291,33 @@ impl Preconditioner {
     /// `solved` and `forces` from `on_modes = Phi^T r` and `at_contact = W^T r`.
     fn solve_coarse(&mut self, env: Env<'_>) {
         let isa = env.isa;
-        if self.dofs.is_empty() {
-            self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
+        if self.contact.dofs.is_empty() {
+            self.galerkin
+                .held
+                .solve(isa, &self.on_modes, &mut self.solved);
             return;
         }
         // Psi^T r = Phi^T r - Phi_C^T A_k,CC^-1 W^T r.
-        self.compliance
-            .solve(isa, &self.at_contact, &mut self.forces);
-        for (force, &dof) in self.forces.iter().zip(&self.dofs) {
+        self.contact
+            .compliance
+            .solve(isa, &self.contact.moved, &mut self.contact.forces);
+        for (force, &dof) in self.contact.forces.iter().zip(&self.contact.dofs) {
             let own = env.space.at_contact(dof as usize);
             for (sum, own) in self.on_modes.iter_mut().zip(own) {
                 *sum -= force * own;
             }
         }
-        self.galerkin.solve(isa, &self.on_modes, &mut self.solved);
+        self.galerkin
+            .held
+            .solve(isa, &self.on_modes, &mut self.solved);
         // Forces that keep the contact where it is, mN.
-        for (value, &dof) in self.at_contact.iter_mut().zip(&self.dofs) {
+        for (value, &dof) in self.contact.moved.iter_mut().zip(&self.contact.dofs) {
             let own = env.space.at_contact(dof as usize);
             *value = -inner(own, &self.solved);
         }
-        self.compliance
-            .solve(isa, &self.at_contact, &mut self.forces);
+        self.contact
+            .compliance
+            .solve(isa, &self.contact.moved, &mut self.contact.forces);
     }
 
     /// `at_contact = W^T r` of the columns in contact, from `coordinates = U^T r` and `on_modes = Phi^T r`.
@@ -325,14 +325,19 @@ impl Preconditioner {
         env.prior.response.dots(
             env.isa,
             env.pool,
-            env.prior.stored_dofs(&self.dofs, &mut self.stored)?,
+            env.prior
+                .stored_dofs(&self.contact.dofs, &mut self.contact.stored)?,
             &self.coordinates,
-            &mut self.at_contact,
+            &mut self.contact.moved,
         )?;
-        for (work, &dof) in self.at_contact.iter_mut().zip(&self.dofs) {
+        for (work, &dof) in self.contact.moved.iter_mut().zip(&self.contact.dofs) {
             let own = env.space.at_contact(dof as usize);
-            for ((inertial_compliance, own), on_mode) in
-                self.inertial_compliance.iter().zip(own).zip(&self.on_modes)
+            for ((inertial_compliance, own), on_mode) in self
+                .modal
+                .inertial_compliance
+                .iter()
+                .zip(own)
+                .zip(&self.on_modes)
             {
                 *work -= inertial_compliance * own * on_mode;
             }

@@ -20,20 +20,21 @@ impl ImplicitSolver {
         let held = &env.held.is;
         let forces = 3 * input.contact.len();
         memory::fit(&mut self.next.reaction, forces, "contact forces")?;
-        self.nodes.clear();
+        self.balance.nodes.clear();
         let nodes = input.contact.nodes.iter();
-        self.nodes
+        self.balance
+            .nodes
             .extend(nodes.filter(|&&node| !held[node as usize]));
-        self.preconditioner.prescribe(env, &self.nodes)?;
+        self.preconditioner.prescribe(env, &self.balance.nodes)?;
         self.expect(context, input)?;
         self.memory.begin();
-        self.memory.mask(&self.nodes);
+        self.memory.mask(&self.balance.nodes);
         self.prepare(context, input)?;
         let mut report = Report::default();
 
         // The fields are out of the solver while its methods run, and come back whatever they give.
-        let mut u = std::mem::take(&mut self.u);
-        let mut g = std::mem::take(&mut self.g);
+        let mut u = std::mem::take(&mut self.fields.u);
+        let mut g = std::mem::take(&mut self.fields.g);
         let result = self
             .iterate(context, input, &mut u, &mut g, &mut report)
             .and_then(|()| self.finish(context, input, &u));
@@ -49,7 +50,7 @@ impl ImplicitSolver {
         }
         // Forces are those of the state that stands, of which `g` is the residual.
         let result = result.and_then(|()| self.take_reaction(context, input.contact, &g));
-        (self.u, self.g) = (u, g);
+        (self.fields.u, self.fields.g) = (u, g);
         result.map(|()| report)
     }
 
@@ -66,21 +67,24 @@ impl ImplicitSolver {
     ) -> Result<f32> {
         let env = context.env();
         let target = |index: usize| {
-            let node = self.nodes[index];
+            let node = self.balance.nodes[index];
             let c = input.contact.at(node).unwrap_or_default();
             let at = 3 * node as usize;
             [0, 1, 2].map(|k| input.last[at + k] + part * (c[k] - input.last[at + k]))
         };
-        self.preconditioner.respond(env, target, &mut self.d, u)?;
+        self.preconditioner
+            .respond(env, target, &mut self.fields.d, u)?;
         // The response has them there but for rounding; exactly there is what the host prescribed.
-        for index in 0..self.nodes.len() {
-            let at = 3 * self.nodes[index] as usize;
+        for index in 0..self.balance.nodes.len() {
+            let at = 3 * self.balance.nodes[index] as usize;
             u[at..at + 3].copy_from_slice(&target(index));
         }
         env.held.put(u);
-        let (det, _) = self.residual(context, [input.last, u, u], g, report)?;
+        let (det, _) = self
+            .balance
+            .residual(context, [input.last, u, u], g, report)?;
         // Forces are known of this state even if no iteration comes.
-        self.stand();
+        self.balance.stand();
         Ok(det)
     }
 
@@ -94,7 +98,7 @@ impl ImplicitSolver {
         let env = context.env();
         let held = &env.held.is;
         let reaction = &mut self.next.reaction;
-        let mut rows = self.at_nodes[1].as_chunks::<3>().0.iter();
+        let mut rows = self.balance.at_nodes[1].as_chunks::<3>().0.iter();
         for &node in &contact.nodes {
             let row = match held[node as usize] {
                 true => None,

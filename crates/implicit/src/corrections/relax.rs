@@ -23,9 +23,9 @@ impl ImplicitSolver {
         report: &mut Report,
     ) -> Result<()> {
         let env = context.env();
-        let start = self.size(env, g)?;
+        let start = self.balance.size(env, g)?;
         for iteration in 0..input.enough.iterations {
-            let size = self.size(env, g)?;
+            let size = self.balance.size(env, g)?;
             let until = input.enough.until;
             // A budget never takes the first iteration: a guess without one may be anywhere.
             let late = until.is_some_and(|until| Instant::now() >= until);
@@ -39,7 +39,7 @@ impl ImplicitSolver {
                 break;
             }
         }
-        let end = self.size(env, g)?;
+        let end = self.balance.size(env, g)?;
         if !end.is_finite() || det < SMALLEST_DET {
             u.fill(0.0);
             // Linear elasticity from rest takes the place of a state that inverts elements, and its pairs would lead back there.
@@ -72,10 +72,14 @@ impl ImplicitSolver {
         &mut self,
         call: impl FnOnce(&mut ImplicitSolver, [&mut Vec<f32>; 3]) -> Result<T>,
     ) -> Result<T> {
-        let [mut d, mut q, mut g_new] =
-            [&mut self.d, &mut self.q, &mut self.g_new].map(std::mem::take);
+        let [mut d, mut q, mut g_new] = [
+            &mut self.fields.d,
+            &mut self.fields.q,
+            &mut self.fields.g_new,
+        ]
+        .map(std::mem::take);
         let made = call(self, [&mut d, &mut q, &mut g_new]);
-        (self.d, self.q, self.g_new) = (d, q, g_new);
+        (self.fields.d, self.fields.q, self.fields.g_new) = (d, q, g_new);
         made
     }
 
@@ -89,23 +93,32 @@ impl ImplicitSolver {
     ) -> Result<f32> {
         let env = context.env();
         let preconditioner = &mut self.preconditioner;
-        let nodes = &self.nodes;
+        let nodes = &self.balance.nodes;
         self.memory.direction(env, g, q, d, |q, z| {
             mask(nodes, q);
             preconditioner.apply(env, q, z)
         })?;
-        mask(&self.nodes, d);
+        mask(&self.balance.nodes, d);
         let mut slope = [0.0];
-        dots(env.isa, env.pool, &[g], d, &mut self.partial, &mut slope)?;
+        dots(
+            env.isa,
+            env.pool,
+            &[g],
+            d,
+            &mut self.balance.partial,
+            &mut slope,
+        )?;
         let [slope] = slope;
         let mut search = LineSearch::new(slope);
         loop {
             let t = search.t;
             passes::shorten(env, u, d, t, q)?;
-            let (det_new, slope_new) = self.residual(context, [last, q, d], g_new, report)?;
+            let (det_new, slope_new) =
+                self.balance
+                    .residual(context, [last, q, d], g_new, report)?;
             match search.judge(det_new > SMALLEST_DET, slope_new) {
                 Tried::Accepted => {
-                    self.stand();
+                    self.balance.stand();
                     u.copy_from_slice(q);
                     passes::difference(env, g_new, g, q)?;
                     self.memory.store(env, d, t, q)?;

@@ -49,7 +49,7 @@ impl ImplicitSolver {
             input.last,
             &mut own.history,
             &step,
-            &mut self.scratch,
+            &mut self.balance.scratch,
             (to, start.then_some(from)),
             &|count, task| {
                 if let Err(error) = context.pool.run(count, task) {

@@ -80,14 +80,14 @@ impl ImplicitSolver {
         let _awake = context.pool.keep_awake();
         self.remember(context, input, false)?;
         let Some((substeps, substepper)) = substeps else {
-            return self.correct_loaded(context, input, problem, next);
+            return self.make_loaded(context, input, problem, next, true);
         };
         // From an inverted state a step begins at rest, and so would each of its parts.
         let lost = self.motion.min_det < SMALLEST_DET;
         if substeps.helps(self.motion.truncated_mm) && !lost {
             return self.drive_substeps(context, input, problem, (substeps, substepper), next);
         }
-        let whole = self.correct_loaded(context, input, problem, next)?;
+        let whole = self.make_loaded(context, input, problem, next, true)?;
         // Where the iterations have lost the contact they would lose it again.
         let helps = substeps.helps(libm::hypotf(self.next.truncated_mm, whole.remaining_mm));
         if whole.fell_back || !helps {

@@ -55,27 +55,49 @@ struct Iterate<'a> {
     sunk_mm: Option<f32>,
 }
 
-impl ImplicitSolver {
-    /// One step with the tools where they are.
-    fn balance_loaded(
+impl Iterate<'_> {
+    /// `F(u)` and det F of a state that no iteration led to, in a step from `last`.
+    fn evaluate(
         &mut self,
+        solver: &mut ImplicitSolver,
         context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        next: &mut [f32],
-    ) -> Result<Report> {
-        self.nodes.clear();
-        problem.tied.step_s = context.time_step.integrator.step_s as f32;
+        last: &[f32],
+        report: &mut Report,
+    ) -> Result<()> {
+        (self.det, _) = solver
+            .balance
+            .residual(context, [last, self.u, self.u], self.g, report)?;
+        self.sunk_mm = None;
+        Ok(())
+    }
+}
+
+/// A step that tools drive, while it is made.
+///
+/// The solver's last motion and the problem's `past` are those of the last published state, and do not change; `report` is that of the last attempt.
+struct ToolStep<'a> {
+    solver: &'a mut ImplicitSolver,
+    context: SolverContext<'a>,
+    input: &'a Input<'a>,
+    problem: &'a mut ContactProblem,
+    report: Report,
+}
+
+impl ToolStep<'_> {
+    /// One step with the tools where they are.
+    fn balance_loaded(&mut self, next: &mut [f32]) -> Result<()> {
+        self.solver.balance.nodes.clear();
+        self.problem.tied.step_s = self.context.time_step.integrator.step_s as f32;
         // Contact is a load here, and nothing is prescribed: the pairs of the whole field hold at every node.
-        self.memory.mask(&[]);
-        self.expect(context, input)?;
-        self.prepare(context, input)?;
-        let mut report = Report {
-            level: self.motion.level as usize,
+        self.solver.memory.mask(&[]);
+        self.solver.expect(self.context, self.input)?;
+        self.solver.prepare(self.context, self.input)?;
+        self.report = Report {
+            level: self.solver.motion.level as usize,
             ..Report::default()
         };
-        let mut u = std::mem::take(&mut self.u);
-        let mut g = std::mem::take(&mut self.g);
+        let mut u = std::mem::take(&mut self.solver.fields.u);
+        let mut g = std::mem::take(&mut self.solver.fields.g);
         let mut at = Iterate {
             u: &mut u,
             g: &mut g,
@@ -83,140 +105,113 @@ impl ImplicitSolver {
             sunk_mm: None,
         };
         let result = self
-            .iterate_loaded(context, input, problem, &mut at, &mut report)
-            .and_then(|()| self.finish(context, input, at.u));
+            .iterate_loaded(&mut at)
+            .and_then(|()| self.solver.finish(self.context, self.input, at.u));
         if result.is_ok() {
             next.copy_from_slice(&u);
-            if report.fell_back {
-                self.stop_next();
-                self.leave_load()?;
+            if self.report.fell_back {
+                self.solver.stop_next();
+                self.solver.leave_load()?;
             }
-            self.next.min_det = report.min_det;
-            self.next.level = report.level as u32;
+            self.solver.next.min_det = self.report.min_det;
+            self.solver.next.level = self.report.level as u32;
             // Known only now: how far the next step reaches decides whether this one's pairs are of use to it.
-            self.leave_level();
-            self.estimate(&mut report);
+            self.solver.leave_level();
+            self.solver.estimate(&mut self.report);
         }
-        (self.u, self.g) = (u, g);
-        result.map(|()| report)
+        (self.solver.fields.u, self.solver.fields.g) = (u, g);
+        result
     }
 
-    fn iterate_loaded(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<()> {
+    fn iterate_loaded(&mut self, at: &mut Iterate<'_>) -> Result<()> {
         let _span = tracing::trace_span!("guess").entered();
-        self.guess_loaded(context, input, problem, at, report)?;
-        if context.held.let_go != 0 && at.det > SMALLEST_DET {
+        self.guess_loaded(at)?;
+        if self.context.held.let_go != 0 && at.det > SMALLEST_DET {
             // No mode of the bundle moves what the group held, and from where it has gone iterations find the rest.
-            self.move_whole(context, input, problem, at, report, 0.0)?;
+            self.move_whole(at, 0.0)?;
         }
         // `fall_back` and `recover` come back to it.
-        self.guess.copy_from_slice(at.u);
-        problem.kept.keep_guess(&problem.next)?;
-        let mut size = self.improve_loaded(context, input, problem, at, report)?;
+        self.solver.fields.guess.copy_from_slice(at.u);
+        self.problem.kept.keep_guess(&self.problem.next)?;
+        let mut size = self.improve_loaded(at)?;
         if !is_sound(size, at.det) {
-            size = self.recover(context, input, problem, at, report)?;
+            size = self.recover(at)?;
         }
         // A state in balance may still have lost the tool: a thin one has gone through the surface.
-        let left = sunk(input, problem, at.u, 1.0);
+        let left = sunk(self.input, self.problem, at.u, 1.0);
         if !is_sound(size, at.det) || left > SUNK_MM {
-            self.fall_back(context, input, problem, at, report)?;
+            self.fall_back(at)?;
         }
-        report.min_det = at.det;
+        self.report.min_det = at.det;
         Ok(())
     }
 
     /// The state of the step before, with the forces that it had.
-    fn stay(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<()> {
-        problem.stay();
-        at.u.copy_from_slice(input.last);
-        self.evaluate(context, input, at, report)
+    fn stay(&mut self, at: &mut Iterate<'_>) -> Result<()> {
+        self.problem.stay();
+        at.u.copy_from_slice(self.input.last);
+        self.evaluate(at)
     }
 
     /// `F(u)` and det F of a state that no iteration led to.
-    fn evaluate(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<()> {
-        (at.det, _) = self.residual(context, [input.last, at.u, at.u], at.g, report)?;
-        at.sunk_mm = None;
-        Ok(())
+    fn evaluate(&mut self, at: &mut Iterate<'_>) -> Result<()> {
+        at.evaluate(self.solver, self.context, self.input.last, &mut self.report)
     }
 
     /// The first guess: the last state, the free motion of the natural modes, and the linear response to the tools, in parts of
     /// their way; in so many that the first of them does not halve the smallest det F, with an iteration each.
-    fn guess_loaded(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<()> {
-        let env = context.env();
-        if self.motion.min_det < SMALLEST_DET && !input.still {
-            return self.respond_from_rest(context, input, problem, at, report);
+    fn guess_loaded(&mut self, at: &mut Iterate<'_>) -> Result<()> {
+        let env = self.context.env();
+        if self.solver.motion.min_det < SMALLEST_DET && !self.input.still {
+            return self.respond_from_rest(at);
         }
         // Held tissue beside a cut: the linear response of the intact body would tear at what is no longer there.
-        if problem.next.has_grasp() && !context.corrections.changed.is_empty() {
-            return self.guess_freely(context, input, problem, at, report);
+        if self.problem.next.has_grasp() && !self.context.corrections.changed.is_empty() {
+            return self.guess_freely(at);
         }
         // The guess is made again in twice as many parts, with an iteration after each, until it does not halve the smallest det F.
-        let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
-        let ways = problem.ways.parts(&problem.work);
+        let least = SMALLEST_DET.max(0.5 * self.solver.motion.min_det.min(1.0));
+        let ways = self.problem.ways.parts(&self.problem.work);
         let mut iterated = 1;
         loop {
             // Each attempt begins with the forces of the last step: they belong to `input.last`.
-            problem.restart();
-            at.u.copy_from_slice(input.last);
-            self.add_gravity(context, input, at.u)?;
-            self.lift(context, input, Some(input.last), at.u)?;
-            self.move_freely(env)?;
+            self.problem.restart();
+            at.u.copy_from_slice(self.input.last);
+            self.solver.add_gravity(self.context, self.input, at.u)?;
+            self.solver
+                .lift(self.context, self.input, Some(self.input.last), at.u)?;
+            self.solver.move_freely(env)?;
             let parts = ways.max(iterated);
             let mut part = 0;
             while part < parts {
                 let last = part;
-                part = problem.work.next_part(part, parts);
+                part = self.problem.work.next_part(part, parts);
                 let way = part as f32 / parts as f32;
-                self.press(context, input, problem, way, at.u)?;
+                self.press(self.input.last, way, at.u)?;
                 // An iteration after each of `iterated` parts of the load but the last.
                 let due = part * iterated / parts > last * iterated / parts;
-                let spent = problem.work.is_spent() || is_spent(input, problem, report, 1);
-                let spent = spent || problem.work.is_half_over();
+                let spent = self.problem.work.is_spent()
+                    || is_spent(self.input, self.problem, &self.report, 1);
+                let spent = spent || self.problem.work.is_half_over();
                 if due && part < parts && !spent {
-                    self.settle(env, at.u)?;
-                    self.evaluate(context, input, at, report)?;
+                    self.solver.settle(env, at.u)?;
+                    self.evaluate(at)?;
                     if at.det > SMALLEST_DET {
-                        self.begin_round(context, input, problem, at)?;
-                        self.improve_at(context, input, problem, at, way)?;
-                        self.end_round(context, input, problem, at, report)?;
+                        self.begin_round(at)?;
+                        self.improve_at(at, way)?;
+                        self.end_round(at)?;
                     }
-                    self.preconditioner.coordinates.fill(0.0);
+                    self.solver.preconditioner.coordinates.fill(0.0);
                 }
             }
-            self.settle(env, at.u)?;
-            self.press_on(context, input, problem, KEPT_MM, at.u)?;
-            self.evaluate(context, input, at, report)?;
-            report.parts = parts;
+            self.solver.settle(env, at.u)?;
+            self.press_on(KEPT_MM, at.u)?;
+            self.evaluate(at)?;
+            self.report.parts = parts;
             if at.det > least
                 || iterated >= MOST_PARTS
-                || problem.work.is_spent()
-                || is_spent(input, problem, report, 1)
+                || self.problem.work.is_spent()
+                || is_spent(self.input, self.problem, &self.report, 1)
             {
                 return Ok(());
             }
@@ -224,59 +219,33 @@ impl ImplicitSolver {
         }
     }
 
-    /// The coordinates become `-N diag(1 / (m (w² + kappa))) N^T [I_{n+1}(u_n) - I_n]`: what the natural modes do by themselves.
-    pub(super) fn move_freely(&mut self, env: Env<'_>) -> Result<()> {
-        // What BDF2 takes from the past, less the inertia that the last state had: the modes answer to the difference alone.
-        passes::difference(env, &self.drift, &self.motion.inertia, &mut self.q)?;
-        mask_held(&env.held.is, &mut self.q);
-        self.preconditioner.move_natural(env, &self.q)
-    }
-
     /// Solves the contact on the linear response again, each time about where the tissue has come to, until it lies no deeper in the tools than
     /// `most_mm`. Gives how deep it lies then, mm.
-    fn press_on(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        most_mm: f32,
-        u: &mut [f32],
-    ) -> Result<f32> {
-        let mut left = lost_by(input, problem, u);
+    fn press_on(&mut self, most_mm: f32, u: &mut [f32]) -> Result<f32> {
+        let mut left = lost_by(self.input, self.problem, u);
         for _ in 0..MORE_PRESSES {
-            if left <= most_mm || left == f32::MAX || problem.work.is_spent() {
+            if left <= most_mm || left == f32::MAX || self.problem.work.is_spent() {
                 break;
             }
-            self.preconditioner.coordinates.fill(0.0);
-            self.press(context, input, problem, 1.0, u)?;
-            self.settle(context.env(), u)?;
-            left = lost_by(input, problem, u);
+            self.solver.preconditioner.coordinates.fill(0.0);
+            self.press(self.input.last, 1.0, u)?;
+            self.solver.settle(self.context.env(), u)?;
+            left = lost_by(self.input, self.problem, u);
         }
         Ok(left)
     }
 
-    /// `u` and what the coordinates hold become one.
-    pub(super) fn settle(&mut self, env: Env<'_>, u: &mut [f32]) -> Result<()> {
-        self.preconditioner.decode(env, &mut self.q)?;
-        passes::add(env, &mut self.q, u)
-    }
-
     /// Contact where the tissue is with the coordinates' field on `u`, the tools at part `way` of their way; the
-    /// coordinates take on `A_k B^T (f' - f)`.
-    fn press(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        way: f32,
-        u: &[f32],
-    ) -> Result<()> {
-        let env = context.env();
-        self.preconditioner.decode_domain(env, &mut self.touched)?;
-        for &node in &self.preconditioner.domain_nodes {
+    /// coordinates take on `A_k B^T (f' - f)`. Slips are counted from `start`.
+    fn press(&mut self, start: &[f32], way: f32, u: &[f32]) -> Result<()> {
+        let env = self.context.env();
+        self.solver
+            .preconditioner
+            .decode_domain(env, &mut self.solver.fields.touched)?;
+        for &node in &self.solver.preconditioner.basis.domain_nodes {
             let range = 3 * node as usize..3 * node as usize + 3;
             let base = &u[range.clone()];
-            let touched = &mut self.touched[range];
+            let touched = &mut self.solver.fields.touched[range];
             // The coordinates' field knows nothing of held nodes.
             match env.held.is[node as usize] {
                 true => touched.copy_from_slice(base),
@@ -284,14 +253,36 @@ impl ImplicitSolver {
             }
         }
         let state = State {
-            rest: input.rest,
-            u: &self.touched,
-            start: input.last,
+            rest: self.input.rest,
+            u: &self.solver.fields.touched,
+            start,
         };
-        let compliance = compliance(context, &self.preconditioner);
-        let change = problem.solve(compliance, state, way)?;
-        self.preconditioner
+        let compliance = compliance(self.context, &self.solver.preconditioner);
+        let change = self.problem.solve(compliance, state, way)?;
+        self.solver
+            .preconditioner
             .add_load(env, change.dofs, change.forces)
+    }
+}
+
+impl ImplicitSolver {
+    /// The coordinates become `-N diag(1 / (m (w² + kappa))) N^T [I_{n+1}(u_n) - I_n]`: what the natural modes do by themselves.
+    pub(super) fn move_freely(&mut self, env: Env<'_>) -> Result<()> {
+        // What BDF2 takes from the past, less the inertia that the last state had: the modes answer to the difference alone.
+        passes::difference(
+            env,
+            &self.balance.drift,
+            &self.motion.inertia,
+            &mut self.fields.q,
+        )?;
+        mask_held(&env.held.is, &mut self.fields.q);
+        self.preconditioner.move_natural(env, &self.fields.q)
+    }
+
+    /// `u` and what the coordinates hold become one.
+    pub(super) fn settle(&mut self, env: Env<'_>, u: &mut [f32]) -> Result<()> {
+        self.preconditioner.decode(env, &mut self.fields.q)?;
+        passes::add(env, &mut self.fields.q, u)
     }
 }
 

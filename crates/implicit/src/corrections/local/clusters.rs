@@ -5,7 +5,7 @@ use super::near::NearSet;
 use super::pairs::Room;
 use super::step::add;
 use crate::corrections::far::{FarField, NINE};
-use crate::corrections::precondition::{Env, Preconditioner};
+use crate::corrections::precondition::Env;
 use crate::error::Result;
 use crate::kernels::project::row_dots;
 use crate::kernels::respond::accumulate_rows;
@@ -53,7 +53,6 @@ impl Clusters {
         env: Env<'_>,
         far: &FarField,
         near: &NearSet,
-        preconditioner: &Preconditioner,
         room: &mut Room,
     ) -> Result<()> {
         let modes = env.space.count();
@@ -80,7 +79,7 @@ impl Clusters {
             let Some(part) = part else {
                 continue;
             };
-            room.products_on_modes(env, (near, preconditioner), near.parts.weights(part))?;
+            room.products_on_modes(env, near, near.parts.weights(part))?;
             add(-1.0, &room.linear, own);
         }
         Ok(())

@@ -151,7 +151,7 @@ impl NearColumns {
                     // In the core the factor balances the force: nothing of it is left there.
                     resize(&mut room.field, 9 * near.free)?;
                     let moved = &moved[3 * at * size..][..3 * size];
-                    factor.take_off(env, (near, by.preconditioner), room, (moved, work))?;
+                    factor.take_off(env, near, room, (moved, work))?;
                 }
                 false => {
                     for (axis, work) in work.chunks_exact_mut(modes).enumerate() {
@@ -178,11 +178,11 @@ impl NearFactor {
     pub fn take_off(
         &self,
         env: Env<'_>,
-        level: (&NearSet, &Preconditioner),
+        near: &NearSet,
         room: &mut Room,
         (t, p): (&[f32], &mut [f32]),
     ) -> Result<()> {
-        let (free, modes) = (3 * level.0.free, env.space.count());
+        let (free, modes) = (3 * near.free, env.space.count());
         let count = p.len() / modes;
         let core = t.len() / count.max(1);
         for n in 0..count {
@@ -190,7 +190,7 @@ impl NearFactor {
             self.around(&t[n * core..][..core], &mut field[core..]);
         }
         resize(&mut room.linear, p.len())?;
-        room.on_modes(env, level, count)?;
+        room.on_modes(env, near, count)?;
         add(-1.0, &room.linear, p);
         Ok(())
     }

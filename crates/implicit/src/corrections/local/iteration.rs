@@ -29,33 +29,33 @@ impl LocalSolver {
         // The direction for the loads that are there; then what the contact changes at its end, as a second answer of the same preconditioner.
         self.descend(step, problem)?;
         self.solve_contact(step, problem, base, way)?;
-        let stiff = &mut self.d_stiff;
-        step.preconditioner.stiffen(env, &self.d.c, stiff)?;
-        self.near.linear(env, &self.d_modes, &mut self.d_linear);
+        let stiff = &mut self.d.stiff;
+        step.preconditioner.stiffen(env, &self.d.step.c, stiff)?;
+        self.near.linear(env, &self.d.modes, &mut self.d.linear);
         self.measure_direction(env);
         // Along a line the loads do not change, so their work is a constant of the slopes.
         let work = self.work(problem);
-        let slope = self.residual.over(&self.d) - work;
+        let slope = self.balance.residual.over(&self.d.step) - work;
         let mut search = LineSearch::new(slope);
         loop {
             let t = search.t;
             self.place_at(base, t);
             let det = self.evaluate(step, t)?;
             // `d` is the direction until `accept` scales it: the slope is that of the line, not of the part.
-            let slope_new = self.next.over(&self.d) - work;
+            let slope_new = self.balance.next.over(&self.d.step) - work;
             let sunk_mm = match det > SMALLEST_DET {
-                true => sunk(problem, &self.trial),
+                true => sunk(problem, &self.balance.trial),
                 false => f32::MAX,
             };
             // An iteration may not lose the contact, unless it had been lost.
             let is_kept = sunk_mm <= 0.5 * SUNK_MM || {
                 self.place_at(base, 0.0);
-                sunk_mm <= sunk(problem, &self.trial)
+                sunk_mm <= sunk(problem, &self.balance.trial)
             };
             match search.judge(is_kept, slope_new) {
                 Tried::Accepted => {
                     self.accept(step, t)?;
-                    self.det = det;
+                    self.measured.det = det;
                     // The forces were solved for at the whole direction.
                     if t < 1.0 {
                         problem.kept.blend(&mut problem.next, t);
@@ -71,7 +71,7 @@ impl LocalSolver {
                     // Back to the forces and the state before; pairs and factor have led astray, and are forgotten.
                     problem.kept.undo(&mut problem.next);
                     self.pairs.clear();
-                    self.factor.clear();
+                    self.tangent.factor.clear();
                     return Ok(Gain::default());
                 }
             }
@@ -81,24 +81,24 @@ impl LocalSolver {
     /// The direction of L-BFGS, without what the contact makes of it.
     fn descend(&mut self, step: &mut StepContext<'_>, problem: &ContactProblem) -> Result<()> {
         let env = step.context.env();
-        self.reduced.take(&self.residual)?;
-        let (near, reduced) = (&self.near, &mut self.reduced);
+        self.balance.reduced.take(&self.balance.residual)?;
+        let (near, reduced) = (&self.near, &mut self.balance.reduced);
         each_load(problem, near, |place, force| {
             add(-1.0, &force, &mut reduced.r[place..])
         });
         self.take_loads_off(step, problem)?;
         // The two halves of L-BFGS, with the preconditioner where an initial matrix would stand.
-        let recursion = self.pairs.descend(env.isa, &mut self.reduced);
-        self.d.clear(&self.near)?;
+        let recursion = self.pairs.descend(env.isa, &mut self.balance.reduced);
+        self.d.step.clear(&self.near)?;
         self.precondition(step)?;
-        self.pairs.ascend(env.isa, recursion, &mut self.d);
+        self.pairs.ascend(env.isa, recursion, &mut self.d.step);
         self.decode_direction(step)
     }
 
     /// Takes the work of the modes on the tools' loads off the reduced residual.
     fn take_loads_off(&mut self, step: &StepContext<'_>, problem: &ContactProblem) -> Result<()> {
         let env = step.context.env();
-        let (p, mut is_known) = (&mut self.reduced.p, true);
+        let (p, mut is_known) = (&mut self.balance.reduced.p, true);
         problem.each_load(
             |node, force| match env.prior.column_for(&env.held.is, node) {
                 Some((column, true)) => {
@@ -113,7 +113,7 @@ impl LocalSolver {
             return Ok(());
         }
         // On nodes without columns.
-        let (near, field) = (&self.near, &mut self.room.field);
+        let (near, field) = (&self.near, &mut self.spare.room.field);
         resize(field, 3 * near.free)?;
         each_load(problem, near, |place, force| {
             let node = near.nodes[place / 3];
@@ -121,9 +121,9 @@ impl LocalSolver {
                 add(1.0, &force, &mut field[place..]);
             }
         });
-        near.project(env, field, &mut self.room.q);
-        let work = &mut self.on_modes;
-        (step.preconditioner).on_modes_in(env, &near.ranges, &self.room.q, work);
+        near.project(env, field, &mut self.spare.room.q);
+        let work = &mut self.spare.on_modes;
+        env.on_modes_in(&near.ranges, &self.spare.room.q, work);
         add(-1.0, work, p);
         Ok(())
     }
@@ -133,36 +133,35 @@ impl LocalSolver {
     fn precondition(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
         let preconditioner = &*step.preconditioner;
-        let (near, room) = (&self.near, &mut self.room);
+        let (near, room) = (&self.near, &mut self.spare.room);
         let core = 3 * near.core;
         // `B r` in the core, in place; the residual of the core becomes the move that balances it.
-        let (t, outer) = self.reduced.r.split_at_mut(core);
+        let (t, outer) = self.balance.reduced.r.split_at_mut(core);
         let rows = outer.as_chunks::<3>().0.iter();
-        let places = self.d.t[core..].as_chunks_mut::<3>().0.iter_mut();
+        let places = self.d.step.t[core..].as_chunks_mut::<3>().0.iter_mut();
         for ((t, r), &node) in places.zip(rows).zip(&near.nodes[near.core..]) {
             let [xx, xy, xz, yy, yz, zz] = env.time_step.inverse_blocks[node as usize];
             t[0] += DIAGONAL_WEIGHT * (xx * r[0] + xy * r[1] + xz * r[2]);
             t[1] += DIAGONAL_WEIGHT * (xy * r[0] + yy * r[1] + yz * r[2]);
             t[2] += DIAGONAL_WEIGHT * (xz * r[0] + yz * r[1] + zz * r[2]);
         }
-        let p = &mut self.reduced.p;
+        let p = &mut self.balance.reduced.p;
         resize(&mut room.field, 3 * near.free)?;
         room.field[..core].copy_from_slice(t);
-        self.factor.solve(env.isa, t);
-        self.factor
-            .take_off(env, (near, preconditioner), room, (t, p))?;
+        self.tangent.factor.solve(env.isa, t);
+        self.tangent.factor.take_off(env, near, room, (t, p))?;
         // `G^-1` of what is left to the modes once the core has moved.
-        preconditioner.respond_on_modes(env, p, &mut self.solved)?;
-        add(1.0, &self.solved, &mut self.d.c);
-        add(1.0, t, &mut self.d.t);
-        preconditioner.near_coordinates(env, &self.solved, &near.ranges, &mut room.q);
+        preconditioner.respond_on_modes(env, p, &mut self.spare.solved)?;
+        add(1.0, &self.spare.solved, &mut self.d.step.c);
+        add(1.0, t, &mut self.d.step.t);
+        env.near_coordinates(&self.spare.solved, &near.ranges, &mut room.q);
         resize(&mut room.linear, 3 * near.nodes.len())?;
         near.decode(env, &room.q, &mut room.linear)?;
         // In the core the field that the move of the modes stretches over it takes its place.
-        self.factor.stretch(&room.linear, t);
-        self.factor.solve(env.isa, t);
-        add(-1.0, t, &mut self.d.t);
-        add(-1.0, &room.linear[..core], &mut self.d.t);
+        self.tangent.factor.stretch(&room.linear, t);
+        self.tangent.factor.solve(env.isa, t);
+        add(-1.0, t, &mut self.d.step.t);
+        add(-1.0, &room.linear[..core], &mut self.d.step.t);
         Ok(())
     }
 
@@ -179,11 +178,15 @@ impl LocalSolver {
         self.place_at(base, 1.0);
         let state = State {
             rest: step.input.rest,
-            u: &self.trial,
+            u: &self.balance.trial,
             start: step.input.last,
         };
         // Columns are made as the contact asks for them, so the response changes while the problem reads it: hence the `RefCell`.
-        let own = (&mut self.factor, &mut self.columns, &mut self.room);
+        let own = (
+            &mut self.tangent.factor,
+            &mut self.tangent.columns,
+            &mut self.spare.room,
+        );
         let response = Response {
             env,
             near: &self.near,
@@ -197,16 +200,16 @@ impl LocalSolver {
             inertia: Some((env.space, step.preconditioner.inertial_compliance())),
         };
         let change = problem.solve(compliance, state, way)?;
-        self.loads.clear();
-        memory::fit(&mut self.loads, change.dofs.len(), WHAT)?;
+        self.spare.loads.clear();
+        memory::fit(&mut self.spare.loads, change.dofs.len(), WHAT)?;
         let loads = change
             .dofs
             .iter()
             .copied()
             .zip(change.forces.iter().copied());
         // The difference alone: what the loads of before do is in the direction.
-        self.loads.extend(loads.filter(|load| load.1 != 0.0));
-        match self.loads.is_empty() {
+        self.spare.loads.extend(loads.filter(|load| load.1 != 0.0));
+        match self.spare.loads.is_empty() {
             true => Ok(()),
             false => self.respond(step),
         }
@@ -215,9 +218,9 @@ impl LocalSolver {
     /// Adds the response to `loads` to the direction.
     pub(super) fn respond(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
-        self.reduced.clear(&self.near)?;
-        let (near, reduced) = (&self.near, &mut self.reduced);
-        for &(dof, force) in &self.loads {
+        self.balance.reduced.clear(&self.near)?;
+        let (near, reduced) = (&self.near, &mut self.balance.reduced);
+        for &(dof, force) in &self.spare.loads {
             let node = env.prior.contact_nodes[dof as usize / 3];
             if near.holds(node)
                 && let Some(place) = near.place(node)
@@ -225,26 +228,25 @@ impl LocalSolver {
                 reduced.r[3 * place + dof as usize % 3] += 1e3 * force;
             }
         }
-        (step.preconditioner).work_of_modes(env, &self.loads, &mut reduced.p);
+        env.work_of_modes(&self.spare.loads, &mut reduced.p);
         self.precondition(step)?;
         // The modes' part of it is decoded already.
-        add(1.0, &self.room.linear, &mut self.d_modes);
+        add(1.0, &self.spare.room.linear, &mut self.d.modes);
         Ok(())
     }
 
     /// `Phi c` of the direction at the near nodes.
     pub(super) fn decode_direction(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
-        let (ranges, q) = (&self.near.ranges, &mut self.room.q);
-        let preconditioner = &*step.preconditioner;
-        preconditioner.near_coordinates(env, &self.d.c, ranges, q);
-        self.near.decode(env, q, &mut self.d_modes)
+        let (ranges, q) = (&self.near.ranges, &mut self.spare.room.q);
+        env.near_coordinates(&self.d.step.c, ranges, q);
+        self.near.decode(env, q, &mut self.d.modes)
     }
 
     /// Root mean square of the direction, weighted by mass.
     fn measure_direction(&mut self, env: Env<'_>) {
         let mut square = 0.0f64;
-        let rows = self.d.t.as_chunks::<3>().0.iter();
+        let rows = self.d.step.t.as_chunks::<3>().0.iter();
         for (t, &node) in rows.zip(&self.near.nodes) {
             let own: f32 = t.iter().map(|t| t * t).sum();
             square += f64::from(own) * f64::from(env.body.mass[node as usize]);
@@ -252,10 +254,10 @@ impl LocalSolver {
         let count = env.space.count();
         // Only the natural modes are orthogonal by mass: the others need the whole Gram matrix.
         let rows = env.space.mass().chunks_exact(count);
-        for (row, value) in rows.zip(&self.d.c) {
-            square += dot(row, &self.d.c) * f64::from(*value);
+        for (row, value) in rows.zip(&self.d.step.c) {
+            square += dot(row, &self.d.step.c) * f64::from(*value);
         }
-        self.moved_mm = (square.max(0.0) / self.mass_g).sqrt() as f32;
+        self.measured.moved_mm = (square.max(0.0) / self.measured.mass_g).sqrt() as f32;
     }
 
     /// Work of the tools' loads over the direction, nJ.
@@ -265,9 +267,9 @@ impl LocalSolver {
         each_load(problem, &self.near, |place, force| {
             for (axis, force) in force.into_iter().enumerate() {
                 let at = place + axis;
-                let mut d = self.d_modes[at];
+                let mut d = self.d.modes[at];
                 if at < inside {
-                    d += self.d.t[at];
+                    d += self.d.step.t[at];
                 }
                 sum += f64::from(d) * f64::from(force);
             }
@@ -279,19 +281,19 @@ impl LocalSolver {
     fn accept(&mut self, step: &mut StepContext<'_>, t: f32) -> Result<()> {
         let env = step.context.env();
         if t != 1.0 {
-            self.d.scale(t);
+            self.d.step.scale(t);
         }
-        add(t, &self.d_modes, &mut self.modes);
-        add(t, &self.d_linear, &mut self.linear);
-        add(t, &self.d_stiff, &mut self.stiff);
+        add(t, &self.d.modes, &mut self.now.modes);
+        add(t, &self.d.linear, &mut self.now.linear);
+        add(t, &self.d.stiff, &mut self.now.stiff);
         // `y` is the change of the residual over the step, `s` the step; the two of them are the pair.
-        self.reduced.take(&self.next)?;
-        self.reduced.add(-1.0, &self.residual);
-        self.now.add(1.0, &self.d);
-        // Before the pair is stored: `self.residual` is the new one from here on, and `reduced` still holds the change.
-        std::mem::swap(&mut self.residual, &mut self.next);
-        let (near, room) = (&self.near, &mut self.room);
-        let pair = (&self.d, &self.reduced);
-        (self.pairs).store(env, near, step.preconditioner, room, &self.about, pair)
+        self.balance.reduced.take(&self.balance.next)?;
+        self.balance.reduced.add(-1.0, &self.balance.residual);
+        self.now.step.add(1.0, &self.d.step);
+        // Before the pair is stored: `self.balance.residual` is the new one from here on, and `reduced` still holds the change.
+        std::mem::swap(&mut self.balance.residual, &mut self.balance.next);
+        let (near, room) = (&self.near, &mut self.spare.room);
+        let pair = (&self.d.step, &self.balance.reduced);
+        (self.pairs).store(env, near, room, &self.reach.about, pair)
     }
 }

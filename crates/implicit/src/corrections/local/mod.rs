@@ -24,6 +24,7 @@ mod linearisation;
 mod near;
 mod pairs;
 mod record;
+mod state;
 mod step;
 
 use ::elements::Scratch;
@@ -33,14 +34,14 @@ use self::columns::NearColumns;
 use self::factor::NearFactor;
 use self::linear::WHAT;
 use self::near::NearSet;
-use self::pairs::{Pairs, Room};
-use self::step::{Change, Step, add, dot, resize};
+use self::pairs::Pairs;
+use self::state::{Balance, Measured, Moved, Reach, Spare};
+use self::step::{add, dot, resize};
 use super::input::{Input, SolverContext};
 use super::passes::add_smoothed;
 use super::precondition::Preconditioner;
 use crate::contact::ContactProblem;
 use crate::error::Result;
-use crate::kernels::vectors::PartialSums;
 use crate::memory::{self, HeldBytes};
 
 pub(super) use self::centres::add_centres;
@@ -77,60 +78,28 @@ pub(super) struct Gain {
     pub sunk_mm: f32,
 }
 
+/// The exact factor close to the tools, and the columns of the contact's compliance that it has made.
+#[derive(Default, HeldBytes)]
+pub(super) struct NearTangent {
+    pub factor: NearFactor,
+    columns: NearColumns,
+}
+
 /// A scene's own part.
 #[derive(HeldBytes)]
 pub struct LocalSolver {
     near: NearSet,
     pub(super) pairs: Pairs,
     clusters: Clusters,
-    pub(super) factor: NearFactor,
-    columns: NearColumns,
-    /// Nodes that the tools touch, thinned out: what the pairs are about.
-    about: Vec<u32>,
+    pub(super) tangent: NearTangent,
+    pub(super) reach: Reach,
     /// Since the base.
-    now: Step,
-    residual: Change,
-    /// Forces of the near elements at the free nodes, inertia with them at the inside ones, at the base and of the next state, and what of the change
-    /// is linear in `c`; `[3 free]`.
-    base: Vec<f32>,
-    inner: Vec<f32>,
-    linear: Vec<f32>,
-    /// `Phi^T r` at the base, and `G c` since.
-    base_modes: Vec<f32>,
-    stiff: Vec<f32>,
-    /// The direction, and what is linear in it.
-    d: Step,
-    /// `Phi c` of the direction and of the steps since the base at the near nodes `[.., 3]`, by place.
-    d_modes: Vec<f32>,
-    modes: Vec<f32>,
-    d_linear: Vec<f32>,
-    d_stiff: Vec<f32>,
-    /// The residual without the loads, as the first recursion changes it; that of the next state.
-    reduced: Change,
-    next: Change,
-    /// Where the tissue would be `[K,3]`; at nodes that are not near, the base.
-    trial: Vec<f32>,
-    /// Of the whole body.
-    mass_g: f64,
-    /// Nodes that the tools touch, while a round begins.
-    pub(super) touched: Vec<u32>,
-    /// How far the next round reaches, a level of the near set.
-    pub(super) level: usize,
-    /// Smallest det F of the far elements at the base.
-    far_det: f32,
-    /// Smallest det F, and the root mean square that the last direction moves, mm.
-    pub(super) det: f32,
-    pub(super) moved_mm: f32,
-    /// Root mean square over the nodes that the last smoothing of the far ones moved, mm.
-    pub(super) far_mm: f32,
-    /// Farthest that a far node has gone since the base, mm.
-    pub(super) far_moved_mm: f32,
-    partial: PartialSums,
-    room: Room,
-    on_modes: Vec<f32>,
-    more_on_modes: Vec<f32>,
-    solved: Vec<f32>,
-    loads: Vec<(u32, f32)>,
+    now: Moved,
+    /// The direction.
+    d: Moved,
+    balance: Balance,
+    pub(super) measured: Measured,
+    spare: Spare,
 }
 
 impl LocalSolver {
@@ -140,49 +109,18 @@ impl LocalSolver {
     /// [`crate::Error::OutOfMemory`].
     pub fn new(context: SolverContext<'_>) -> Result<LocalSolver> {
         let env = context.env();
-        let far = &context.corrections.far;
-        let (count, width) = (env.space.count(), env.prior.width());
-        let columns = (3 * env.prior.contact_nodes.len()).min(768);
-        let modes = || memory::zeros(count, WHAT);
+        let (nodes, count) = (env.body.mass.len(), env.space.count());
         Ok(LocalSolver {
             near: NearSet::new(env)?,
             pairs: Pairs::new(count)?,
-            clusters: Clusters::new(far, count)?,
-            factor: NearFactor::default(),
-            columns: NearColumns::default(),
-            about: memory::room(64, WHAT)?,
-            now: Step::with_modes(count)?,
-            residual: Change::with_modes(count)?,
-            base: Vec::new(),
-            inner: Vec::new(),
-            linear: Vec::new(),
-            base_modes: modes()?,
-            stiff: modes()?,
-            d: Step::with_modes(count)?,
-            d_modes: Vec::new(),
-            modes: Vec::new(),
-            d_linear: Vec::new(),
-            d_stiff: modes()?,
-            reduced: Change::with_modes(count)?,
-            next: Change::with_modes(count)?,
-            trial: memory::zeros(3 * env.body.mass.len(), WHAT)?,
-            mass_g: env.body.mass.iter().map(|&mass| f64::from(mass)).sum(),
-            touched: memory::room(256, WHAT)?,
-            level: 0,
-            far_det: 1.0,
-            det: 1.0,
-            moved_mm: 0.0,
-            far_mm: 0.0,
-            far_moved_mm: 0.0,
-            partial: PartialSums::with_room(3 * env.body.mass.len(), 1)?,
-            room: Room {
-                q: memory::zeros(width, WHAT)?,
-                ..Room::default()
-            },
-            on_modes: modes()?,
-            more_on_modes: modes()?,
-            solved: modes()?,
-            loads: memory::room(columns, WHAT)?,
+            clusters: Clusters::new(&context.corrections.far, count)?,
+            tangent: NearTangent::default(),
+            reach: Reach::new()?,
+            now: Moved::with_modes(count)?,
+            d: Moved::with_modes(count)?,
+            balance: Balance::new(nodes, count)?,
+            measured: Measured::new(env),
+            spare: Spare::new(env)?,
         })
     }
 
@@ -207,53 +145,53 @@ impl LocalSolver {
         let env = step.context.env();
         let far = &step.context.corrections.far;
         let rest = step.input.rest;
-        self.about.clear();
-        add_centres(rest, &step.context.corrections.changed, &mut self.about)?;
+        self.reach.about.clear();
+        add_centres(
+            rest,
+            &step.context.corrections.changed,
+            &mut self.reach.about,
+        )?;
         // What a group held is as near as what a tool touches: no mode of the bundle moves it.
         for group in step.context.let_go_groups() {
-            add_centres(rest, &group.nodes, &mut self.about)?;
+            add_centres(rest, &group.nodes, &mut self.reach.about)?;
         }
-        add_centres(rest, &self.touched, &mut self.about)?;
+        add_centres(rest, &self.reach.touched, &mut self.reach.about)?;
         let pairs = &self.pairs;
         let abouts = pairs.records().map(|record| record.about.as_slice());
         let last = pairs
             .records()
             .last()
             .map(|record| record.centres.as_slice());
-        self.near.choose(rest, last, &self.about, abouts)?;
-        if !self.near.is_chosen(self.level) {
+        self.near.choose(rest, last, &self.reach.about, abouts)?;
+        if !self.near.is_chosen(self.reach.level) {
             self.pairs.forget_layout();
-            self.near.fill(env, far, rest, self.level)?;
-            let (near, room) = (&self.near, &mut self.room);
-            (self.clusters).leave_out(env, far, near, step.preconditioner, room)?;
-            self.factor.plan(&self.near, rest)?;
+            self.near.fill(env, far, rest, self.reach.level)?;
+            let (near, room) = (&self.near, &mut self.spare.room);
+            (self.clusters).leave_out(env, far, near, room)?;
+            self.tangent.factor.plan(&self.near, rest)?;
             self.near.finish();
         }
-        (self.factor).renew(env, &self.near, far, base.u)?;
-        self.pairs
-            .lay_out(env, &self.near, step.preconditioner, &mut self.room)?;
+        (self.tangent.factor).renew(env, &self.near, far, base.u)?;
+        self.pairs.lay_out(env, &self.near, &mut self.spare.room)?;
         self.now.clear(&self.near)?;
-        self.residual.clear(&self.near)?;
-        resize(&mut self.base, 3 * self.near.free)?;
-        resize(&mut self.linear, 3 * self.near.free)?;
-        resize(&mut self.d_linear, 3 * self.near.free)?;
-        resize(&mut self.inner, 3 * self.near.free)?;
-        resize(&mut self.modes, 3 * self.near.nodes.len())?;
-        resize(&mut self.d_modes, 3 * self.near.nodes.len())?;
+        self.d.clear(&self.near)?;
+        self.balance.residual.clear(&self.near)?;
+        resize(&mut self.balance.base, 3 * self.near.free)?;
+        resize(&mut self.balance.inner, 3 * self.near.free)?;
         step.preconditioner.project(env, base.residual)?;
         let q = &step.preconditioner.coordinates;
-        step.preconditioner.on_modes(env, q, &mut self.base_modes)?;
-        self.stiff.fill(0.0);
-        self.d_stiff.fill(0.0);
+        env.on_modes(q, &mut self.balance.base_modes)?;
         self.clusters.begin(far, &self.near, base.u);
-        self.trial.copy_from_slice(base.u);
-        self.d.clear(&self.near)?;
-        self.far_det = f32::MAX;
+        self.balance.trial.copy_from_slice(base.u);
+        self.measured.far_det = f32::MAX;
         self.evaluate(step, 0.0)?;
-        std::mem::swap(&mut self.residual, &mut self.next);
+        std::mem::swap(&mut self.balance.residual, &mut self.balance.next);
         // What the base has is not what has come since.
-        self.base.copy_from_slice(&self.inner);
-        self.residual.p.copy_from_slice(&self.base_modes);
+        self.balance.base.copy_from_slice(&self.balance.inner);
+        self.balance
+            .residual
+            .p
+            .copy_from_slice(&self.balance.base_modes);
         // Of a chunk that is near in part the far elements are looked at one by one where it is bad.
         let forces = &env.body.forces;
         let dets = step.scratch.smallest_by_chunk().iter().enumerate();
@@ -263,7 +201,7 @@ impl LocalSolver {
             _ if found > LOOKED_AT_DET => f32::MAX,
             _ => self.near.far_det(forces, chunk, base.u),
         });
-        self.far_det = far_dets.fold(f32::MAX, f32::min);
+        self.measured.far_det = far_dets.fold(f32::MAX, f32::min);
         Ok(())
     }
 
@@ -281,21 +219,21 @@ impl LocalSolver {
 
     /// The level that the next step begins with, `u` being the state of this one.
     pub(super) fn next_level(&self, u: &[f32]) -> usize {
-        if self.touched.is_empty() {
+        if self.reach.touched.is_empty() {
             // What moves then is not what a tool pushes.
-            return self.level;
+            return self.reach.level;
         }
         let u = u.as_chunks::<3>().0;
-        let squares = self.touched.iter().map(|&node| u[node as usize]);
+        let squares = self.reach.touched.iter().map(|&node| u[node as usize]);
         let squares = squares.map(|u| u.iter().map(|u| u * u).sum::<f32>());
         let pushed_mm = squares.fold(0.0, f32::max).sqrt();
-        near::next_level(self.level, self.far_mm, pushed_mm)
+        near::next_level(self.reach.level, self.measured.far_mm, pushed_mm)
     }
 
     /// `|r_S - loads|`, µN: what is out of balance near the tools.
     pub(super) fn unbalanced(&mut self, problem: &ContactProblem) -> Result<f64> {
-        memory::replace(&mut self.reduced.r, &self.residual.r, WHAT)?;
-        let (near, r) = (&self.near, &mut self.reduced.r);
+        memory::replace(&mut self.balance.reduced.r, &self.balance.residual.r, WHAT)?;
+        let (near, r) = (&self.near, &mut self.balance.reduced.r);
         each_load(problem, near, |place, force| {
             add(-1.0, &force, &mut r[place..])
         });
@@ -308,13 +246,13 @@ impl LocalSolver {
         for (place, &node) in self.near.nodes[..self.near.free].iter().enumerate() {
             for axis in 0..3 {
                 let (at, from) = (3 * place + axis, 3 * node as usize + axis);
-                let mut moved = self.modes[at];
-                let mut along = if t == 0.0 { 0.0 } else { self.d_modes[at] };
+                let mut moved = self.now.modes[at];
+                let mut along = if t == 0.0 { 0.0 } else { self.d.modes[at] };
                 if at < inside {
-                    moved += self.now.t[at];
-                    along += if t == 0.0 { 0.0 } else { self.d.t[at] };
+                    moved += self.now.step.t[at];
+                    along += if t == 0.0 { 0.0 } else { self.d.step.t[at] };
                 }
-                self.trial[from] = base[from] + moved + t * along;
+                self.balance.trial[from] = base[from] + moved + t * along;
             }
         }
     }
@@ -323,36 +261,39 @@ impl LocalSolver {
     fn evaluate(&mut self, step: &mut StepContext<'_>, t: f32) -> Result<f32> {
         let env = step.context.env();
         let far = &step.context.corrections.far;
-        self.next.clear(&self.near)?;
-        let (near, inner) = (&mut self.near, &mut self.inner);
-        let det = near.internal(&self.trial, inner);
+        self.balance.next.clear(&self.near)?;
+        let (near, inner) = (&mut self.near, &mut self.balance.inner);
+        let det = near.internal(&self.balance.trial, inner);
         let kappa = env.time_step.integrator.kappa() as f32;
         let rows = inner.as_chunks_mut::<3>().0.iter_mut();
         for (r, &node) in rows.zip(&near.nodes[..near.inside]) {
             let inertia = kappa * env.body.mass[node as usize];
             for (axis, r) in r.iter_mut().enumerate() {
                 let at = 3 * node as usize + axis;
-                *r += step.drift[at] + inertia * (self.trial[at] - step.input.last[at]);
+                *r += step.drift[at] + inertia * (self.balance.trial[at] - step.input.last[at]);
             }
         }
-        self.next.r.copy_from_slice(&inner[..3 * near.inside]);
+        self.balance
+            .next
+            .r
+            .copy_from_slice(&inner[..3 * near.inside]);
         // What the near elements have added to what is linear.
-        resize(&mut self.room.field, 3 * near.free)?;
-        for (at, added) in self.room.field.iter_mut().enumerate() {
-            let linear = self.linear[at] + t * self.d_linear[at];
-            *added = inner[at] - self.base[at] - linear;
+        resize(&mut self.spare.room.field, 3 * near.free)?;
+        for (at, added) in self.spare.room.field.iter_mut().enumerate() {
+            let linear = self.now.linear[at] + t * self.d.linear[at];
+            *added = inner[at] - self.balance.base[at] - linear;
         }
-        let (near, q, p) = (&self.near, &mut self.room.q, &mut self.next.p);
-        near.project(env, &self.room.field, q);
-        (step.preconditioner).on_modes_in(env, &near.ranges, q, &mut self.on_modes);
-        self.more_on_modes.copy_from_slice(&self.now.c);
-        add(t, &self.d.c, &mut self.more_on_modes);
-        let far_det = (self.clusters).added_on_modes(env, far, &self.more_on_modes, p)?;
-        add(1.0, &self.on_modes, p);
-        add(1.0, &self.base_modes, p);
-        add(1.0, &self.stiff, p);
-        add(t, &self.d_stiff, p);
-        Ok(det.min(far_det).min(self.far_det))
+        let (near, q, p) = (&self.near, &mut self.spare.room.q, &mut self.balance.next.p);
+        near.project(env, &self.spare.room.field, q);
+        env.on_modes_in(&near.ranges, q, &mut self.spare.on_modes);
+        self.spare.more_on_modes.copy_from_slice(&self.now.step.c);
+        add(t, &self.d.step.c, &mut self.spare.more_on_modes);
+        let far_det = (self.clusters).added_on_modes(env, far, &self.spare.more_on_modes, p)?;
+        add(1.0, &self.spare.on_modes, p);
+        add(1.0, &self.balance.base_modes, p);
+        add(1.0, &self.now.stiff, p);
+        add(t, &self.d.stiff, p);
+        Ok(det.min(far_det).min(self.measured.far_det))
     }
 
     /// The whole field into `u`, which holds the base, of which `residual` is; `scratch [K,3]`. Leaves what the far nodes were smoothed by in `far_mm`,
@@ -366,20 +307,25 @@ impl LocalSolver {
     ) -> Result<()> {
         let env = step.context.env();
         let preconditioner = &mut *step.preconditioner;
-        preconditioner.take_coordinates(env, &self.now.c)?;
+        preconditioner.take_coordinates(env, &self.now.step.c)?;
         preconditioner.decode(env, scratch)?;
-        for (place, t) in self.now.t.as_chunks::<3>().0.iter().enumerate() {
+        for (place, t) in self.now.step.t.as_chunks::<3>().0.iter().enumerate() {
             let node = self.near.nodes[place] as usize;
             add(1.0, t, &mut scratch[3 * node..][..3]);
         }
         let (near, count) = (&self.near, u.len() / 3);
         let fields = (residual, &mut *scratch, u);
-        let moved = add_smoothed(env, fields, |node| near.holds(node), &mut self.partial)?;
-        self.far_mm = (moved / count.max(1) as f64).sqrt() as f32;
+        let moved = add_smoothed(
+            env,
+            fields,
+            |node| near.holds(node),
+            &mut self.spare.partial,
+        )?;
+        self.measured.far_mm = (moved / count.max(1) as f64).sqrt() as f32;
         let changes = scratch.as_chunks::<3>().0.iter().zip(0..);
         let far = changes.filter(|(_, node)| !near.holds(*node));
         let squares = far.map(|(change, _)| change.iter().map(|x| x * x).sum::<f32>());
-        self.far_moved_mm = squares.fold(0.0, f32::max).sqrt();
+        self.measured.far_moved_mm = squares.fold(0.0, f32::max).sqrt();
         Ok(())
     }
 }

@@ -14,7 +14,7 @@ use super::record::Record;
 use super::step::{Change, Step, add, resize};
 use crate::corrections::history::PAIRS;
 use crate::corrections::memory::{SLOTS, alpha, weight};
-use crate::corrections::precondition::{Env, Preconditioner};
+use crate::corrections::precondition::Env;
 use crate::error::Result;
 use crate::kernels::Isa;
 use crate::kernels::vectors::{piece_add, piece_dots};
@@ -112,18 +112,12 @@ impl Pairs {
     }
 
     /// Lays out all pairs for a near set.
-    pub fn lay_out(
-        &mut self,
-        env: Env<'_>,
-        near: &NearSet,
-        preconditioner: &mut Preconditioner,
-        room: &mut Room,
-    ) -> Result<()> {
+    pub fn lay_out(&mut self, env: Env<'_>, near: &NearSet, room: &mut Room) -> Result<()> {
         let mut is_new = false;
         for at in 0..self.order.len() {
             let slot = self.order[at];
             if !self.laid_out[slot] {
-                self.lay_out_one(env, near, preconditioner, room, slot)?;
+                self.lay_out_one(env, near, room, slot)?;
                 is_new = true;
             }
         }
@@ -142,7 +136,6 @@ impl Pairs {
         &mut self,
         env: Env<'_>,
         near: &NearSet,
-        preconditioner: &mut Preconditioner,
         room: &mut Room,
         slot: usize,
     ) -> Result<()> {
@@ -172,7 +165,7 @@ impl Pairs {
             // Where it was far it was linear.
             resize(&mut room.field, 3 * near.nodes.len())?;
             resize(&mut room.linear, 3 * near.free)?;
-            preconditioner.near_coordinates(env, &step.c, &near.ranges, &mut room.q);
+            env.near_coordinates(&step.c, &near.ranges, &mut room.q);
             near.decode(env, &room.q, &mut room.field)?;
             add(1.0, &step.t, &mut room.field);
             near.linear(env, &room.field, &mut room.linear);
@@ -198,7 +191,6 @@ impl Pairs {
         &mut self,
         env: Env<'_>,
         near: &NearSet,
-        preconditioner: &mut Preconditioner,
         room: &mut Room,
         about: &[u32],
         (step, change): (&Step, &Change),
@@ -212,7 +204,7 @@ impl Pairs {
         self.laid_out[slot] = false;
         // The slot is in no list until the pair is whole: what fails below loses this pair and nothing else.
         self.records[slot].fill(near, about, step, change)?;
-        self.lay_out_one(env, near, preconditioner, room, slot)?;
+        self.lay_out_one(env, near, room, slot)?;
         self.order.push(slot);
         self.multiply(self.order.len() - 1);
         if self.products[slot][slot] <= 0.0 {
@@ -311,12 +303,7 @@ pub(in crate::corrections) struct Room {
 
 impl Room {
     /// `linear [n,r] = Phi^T field` of up to three fields `[n, 3 free]`.
-    pub fn on_modes(
-        &mut self,
-        env: Env<'_>,
-        (near, preconditioner): (&NearSet, &Preconditioner),
-        count: usize,
-    ) -> Result<()> {
+    pub fn on_modes(&mut self, env: Env<'_>, near: &NearSet, count: usize) -> Result<()> {
         let size = self.q.len();
         if self.nine.len() != 9 * size {
             resize(&mut self.nine, 9 * size)?;
@@ -334,7 +321,7 @@ impl Room {
         };
         self.used
             .extend(near.ranges.iter().filter(is_used).cloned());
-        preconditioner.on_modes_in(env, &self.used, three, &mut self.linear);
+        env.on_modes_in(&self.used, three, &mut self.linear);
         Ok(())
     }
 
@@ -342,7 +329,7 @@ impl Room {
     pub fn products_on_modes(
         &mut self,
         env: Env<'_>,
-        (near, preconditioner): (&NearSet, &Preconditioner),
+        near: &NearSet,
         vectors: &[(u32, [f32; 3])],
     ) -> Result<()> {
         let size = self.q.len();
@@ -357,7 +344,7 @@ impl Room {
         }
         near.project_products(env, vectors, &mut self.nine);
         resize(&mut self.linear, 9 * env.space.count())?;
-        preconditioner.on_modes_in(env, &self.used, &self.nine, &mut self.linear);
+        env.on_modes_in(&self.used, &self.nine, &mut self.linear);
         Ok(())
     }
 }

@@ -107,16 +107,17 @@ impl Bench {
         let (mut residual, still) = (self.zero.clone(), &self.zero);
         let mut report = Report::default();
         solver
+            .balance
             .residual(context, [still, u, u], &mut residual, &mut report)
             .unwrap();
         let local = LocalSolver::made(&mut solver.local, context).unwrap();
-        local.touched = vec![touched];
+        local.reach.touched = vec![touched];
         let mut step = StepContext {
             context,
             input,
             preconditioner: &mut solver.preconditioner,
-            scratch: &mut solver.scratch,
-            drift: &solver.drift,
+            scratch: &mut solver.balance.scratch,
+            drift: &solver.balance.drift,
         };
         let base = Base {
             u,
@@ -145,30 +146,31 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     assert!(local.near.inside > 20 && local.near.nodes.len() < bench.mesh.node_count() / 2);
 
     let (c, _) = bench.smooth(&mut random, step_mm);
-    local.d.clear(&local.near).unwrap();
-    local.d.c.copy_from_slice(&c);
-    local.d.t = random.normal(3 * local.near.inside, 0.05 * step_mm);
+    local.d.step.clear(&local.near).unwrap();
+    local.d.step.c.copy_from_slice(&c);
+    local.d.step.t = random.normal(3 * local.near.inside, 0.05 * step_mm);
     local.decode_direction(&mut step).unwrap();
-    let stiff = &mut local.d_stiff;
+    let stiff = &mut local.d.stiff;
     step.preconditioner.stiffen(env, &c, stiff).unwrap();
-    local.near.linear(env, &local.d_modes, &mut local.d_linear);
+    local.near.linear(env, &local.d.modes, &mut local.d.linear);
     local.place_at(&u, 1.0);
     local.evaluate(&mut step, 1.0).unwrap();
-    let found = local.next.p.clone();
+    let found = local.balance.next.p.clone();
 
     // The same state of the whole body.
-    local.now.add(1.0, &local.d);
+    local.now.step.add(1.0, &local.d.step);
     let (mut whole, mut scratch) = (u.clone(), bench.zero.clone());
     local
         .settle(&mut step, &bench.zero, &mut scratch, &mut whole)
         .unwrap();
-    let at_base = local.base_modes.clone();
-    let (near, r_found) = (local.near.nodes.clone(), local.next.r.clone());
-    let before = local.base.clone();
+    let at_base = local.balance.base_modes.clone();
+    let (near, r_found) = (local.near.nodes.clone(), local.balance.next.r.clone());
+    let before = local.balance.base.clone();
     let inside = local.near.inside;
     let (mut r, still) = (bench.zero.clone(), &bench.zero);
     let mut report = Report::default();
     solver
+        .balance
         .residual(context, [still, &whole, &whole], &mut r, &mut report)
         .unwrap();
     let r_whole: Vec<f32> = near[..inside]
@@ -178,10 +180,7 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     solver.preconditioner.project(env, &r).unwrap();
     let q = solver.preconditioner.coordinates.clone();
     let mut wanted = found.clone();
-    solver
-        .preconditioner
-        .on_modes(env, &q, &mut wanted)
-        .unwrap();
+    context.env().on_modes(&q, &mut wanted).unwrap();
     let change = relative(&wanted, &at_base, 1.0);
     let change_near = relative(&r_whole, &before[..3 * inside], 1.0);
     [
@@ -223,7 +222,11 @@ fn contact_has_the_compliance_of_the_preconditioner() {
     assert_eq!(columns.len(), 4);
     let order = 3 * columns.len();
     let mut upper = vec![0.0; order * order];
-    let own = (&mut local.factor, &mut local.columns, &mut local.room);
+    let own = (
+        &mut local.tangent.factor,
+        &mut local.tangent.columns,
+        &mut local.spare.room,
+    );
     let response = Response {
         env,
         near: &local.near,
@@ -234,14 +237,14 @@ fn contact_has_the_compliance_of_the_preconditioner() {
     let largest = upper.iter().fold(0.0f64, |most, a| most.max(a.abs()));
     for from in 0..order {
         // The preconditioner's answer to 1 mN there, at all of them.
-        local.loads = vec![(3 * columns[from / 3] + (from % 3) as u32, 1.0)];
-        local.d.clear(&local.near).unwrap();
-        resize(&mut local.d_modes, 3 * local.near.nodes.len()).unwrap();
+        local.spare.loads = vec![(3 * columns[from / 3] + (from % 3) as u32, 1.0)];
+        local.d.step.clear(&local.near).unwrap();
+        resize(&mut local.d.modes, 3 * local.near.nodes.len()).unwrap();
         local.respond(&mut step).unwrap();
         for to in 0..order {
             let node = nodes[columns[to / 3] as usize];
             let at = 3 * local.near.place(node).unwrap() + to % 3;
-            let found = f64::from(local.d.t[at] + local.d_modes[at]);
+            let found = f64::from(local.d.step.t[at] + local.d.modes[at]);
             let wanted = upper[from.min(to) * order + from.max(to)];
             assert!(
                 (found - wanted).abs() < 2e-3 * largest,

@@ -25,22 +25,22 @@ impl Preconditioner {
         env: Env<'_>,
         has_load: bool,
     ) -> Result<()> {
-        self.has_load = has_load;
-        if self.let_go != env.held.let_go {
-            self.let_go = env.held.let_go;
-            self.whole = None;
+        self.whole.has_load = has_load;
+        if self.whole.let_go != env.held.let_go {
+            self.whole.let_go = env.held.let_go;
+            self.whole.solve = None;
         }
-        if let (true, Some(modes), None) = (has_load, env.whole, &self.whole) {
+        if let (true, Some(modes), None) = (has_load, env.whole, &self.whole.solve) {
             let kappa = env.time_step.integrator.kappa();
             let made = WholeSolve::new(env.compute(), modes, env.space, kappa)?;
-            self.whole = Some(memory::boxed(made, WHAT)?);
+            self.whole.solve = Some(memory::boxed(made, WHAT)?);
         }
         Ok(())
     }
 
     /// The whole modes of a step that has them.
     pub(super) fn whole_modes<'a>(&self, env: Env<'a>) -> Option<&'a WholeModes> {
-        env.whole.filter(|_| self.has_load)
+        env.whole.filter(|_| self.whole.has_load)
     }
 
     /// `u -= V' S^-1 V'^T r`: what the whole modes of a step that has them make of a residual; `scratch [K,3]`.
@@ -51,18 +51,18 @@ impl Preconditioner {
         scratch: &mut [f32],
         u: &mut [f32],
     ) -> Result<()> {
-        let (Some(modes), Some(own)) = (self.whole_modes(env), &mut self.whole) else {
+        let (Some(modes), Some(own)) = (self.whole_modes(env), &mut self.whole.solve) else {
             return Ok(());
         };
         let (basis, phi, rows) = (env.prior.basis(), env.space.modes(), env.space.rows());
         let q = &mut self.coordinates;
-        project_field(env.isa, env.pool, &basis, &self.starts, r, q)?;
+        project_field(env.isa, env.pool, &basis, &self.basis.starts, r, q)?;
         row_dots(env.isa, env.pool, phi, rows, q, &mut self.on_modes)?;
         own.solve(env.compute(), modes, r, &self.on_modes)?;
         self.solved.fill(0.0);
         own.take_off(&mut self.solved);
         accumulate_rows(env.isa, env.pool, phi, rows, &self.solved, false, q)?;
-        decode_rows(env.isa, env.pool, &basis, &self.plan, q, scratch)?;
+        decode_rows(env.isa, env.pool, &basis, &self.basis.plan, q, scratch)?;
         own.add(env.compute(), modes, scratch)?;
         mask_held(&env.held.is, scratch);
         u.iter_mut().zip(&*scratch).for_each(|(u, z)| *u -= z);

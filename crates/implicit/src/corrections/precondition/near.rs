@@ -9,19 +9,9 @@ use crate::kernels::respond::{accumulate_in, accumulate_rows};
 use crate::kernels::rows::Stored;
 
 impl Preconditioner {
-    /// `out = Phi^T E f`, µN, of forces on degrees of freedom with columns, mN.
-    pub fn work_of_modes(&self, env: Env<'_>, forces: &[(u32, f32)], out: &mut [f32]) {
-        out.fill(0.0);
-        for &(dof, force) in forces {
-            for (sum, own) in out.iter_mut().zip(env.space.at_contact(dof as usize)) {
-                *sum += 1e3 * force * own;
-            }
-        }
-    }
-
     /// `out = G^-1 load` with `G = Phi^T (K + kappa M) Phi`: what the modes have of the response to loads on them, mm.
     pub fn respond_on_modes(&self, env: Env<'_>, load: &[f32], out: &mut [f32]) -> Result<()> {
-        let inverse = Stored::F32(&self.galerkin_inverse);
+        let inverse = Stored::F32(&self.galerkin.inverse);
         Ok(row_dots(
             env.isa,
             env.pool,
@@ -34,7 +24,7 @@ impl Preconditioner {
 
     /// `out = G c`, µN.
     pub fn stiffen(&self, env: Env<'_>, c: &[f32], out: &mut [f32]) -> Result<()> {
-        let galerkin = Stored::F32(&self.galerkin_narrow);
+        let galerkin = Stored::F32(&self.galerkin.narrow);
         Ok(row_dots(
             env.isa,
             env.pool,
@@ -45,34 +35,40 @@ impl Preconditioner {
         )?)
     }
 
-    /// The block coordinates of `Phi c` in some ranges; the others keep what they hold.
-    pub fn near_coordinates(
-        &self,
-        env: Env<'_>,
-        c: &[f32],
-        ranges: &[Range<usize>],
-        q: &mut [f32],
-    ) {
-        let modes = (env.space.rows(), c);
-        accumulate_in(env.isa, env.space.modes(), modes, ranges, false, q);
-    }
-
     /// The block coordinates of `Phi c`, as `coordinates`.
     pub fn take_coordinates(&mut self, env: Env<'_>, c: &[f32]) -> Result<()> {
         let (modes, rows) = (env.space.modes(), env.space.rows());
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
         Ok(accumulate_rows(isa, pool, modes, rows, c, false, q)?)
     }
+}
+
+impl Env<'_> {
+    /// `out = Phi^T E f`, µN, of forces on degrees of freedom with columns, mN.
+    pub fn work_of_modes(&self, forces: &[(u32, f32)], out: &mut [f32]) {
+        out.fill(0.0);
+        for &(dof, force) in forces {
+            for (sum, own) in out.iter_mut().zip(self.space.at_contact(dof as usize)) {
+                *sum += 1e3 * force * own;
+            }
+        }
+    }
+
+    /// The block coordinates of `Phi c` in some ranges; the others keep what they hold.
+    pub fn near_coordinates(&self, c: &[f32], ranges: &[Range<usize>], q: &mut [f32]) {
+        let modes = (self.space.rows(), c);
+        accumulate_in(self.isa, self.space.modes(), modes, ranges, false, q);
+    }
 
     /// `Phi^T r` from `coordinates = U^T r [Q]`.
-    pub fn on_modes(&self, env: Env<'_>, q: &[f32], out: &mut [f32]) -> Result<()> {
-        let (modes, rows) = (env.space.modes(), env.space.rows());
-        Ok(row_dots(env.isa, env.pool, modes, rows, q, out)?)
+    pub fn on_modes(&self, q: &[f32], out: &mut [f32]) -> Result<()> {
+        let (modes, rows) = (self.space.modes(), self.space.rows());
+        Ok(row_dots(self.isa, self.pool, modes, rows, q, out)?)
     }
 
     /// The same of `n` lists of coordinates `[n,Q]` that are zero outside of some ranges, to `out [n,r]`.
-    pub fn on_modes_in(&self, env: Env<'_>, ranges: &[Range<usize>], q: &[f32], out: &mut [f32]) {
-        let (modes, rows) = (env.space.modes(), env.space.rows());
-        row_dots_in(env.isa, modes, rows, ranges, q, out);
+    pub fn on_modes_in(&self, ranges: &[Range<usize>], q: &[f32], out: &mut [f32]) {
+        let (modes, rows) = (self.space.modes(), self.space.rows());
+        row_dots_in(self.isa, modes, rows, ranges, q, out);
     }
 }

@@ -17,18 +17,24 @@ impl Preconditioner {
         mut take: impl FnMut(u32, [f32; 3]),
     ) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
-        if self.dofs.is_empty() {
+        if self.contact.dofs.is_empty() {
             return Ok(());
         }
         let basis = env.prior.basis();
         let q = &mut self.coordinates;
-        project_field(isa, pool, &basis, &self.starts, r, q)?;
+        project_field(isa, pool, &basis, &self.basis.starts, r, q)?;
         let (modes, rows) = (env.space.modes(), env.space.rows());
         row_dots(isa, pool, modes, rows, q, &mut self.on_modes)?;
         self.contact_work(env)?;
-        self.compliance
-            .solve(isa, &self.at_contact, &mut self.forces);
-        for (&column, force) in self.columns.iter().zip(self.forces.as_chunks::<3>().0) {
+        self.contact
+            .compliance
+            .solve(isa, &self.contact.moved, &mut self.contact.forces);
+        for (&column, force) in self
+            .contact
+            .columns
+            .iter()
+            .zip(self.contact.forces.as_chunks::<3>().0)
+        {
             take(env.prior.contact_nodes[column as usize], *force);
         }
         Ok(())
@@ -36,12 +42,12 @@ impl Preconditioner {
 
     /// `coordinates` of `Phi solved + W forces`.
     pub(super) fn spread(&mut self, env: Env<'_>) -> Result<()> {
-        for (&dof, force) in self.dofs.iter().zip(&self.forces) {
+        for (&dof, force) in self.contact.dofs.iter().zip(&self.contact.forces) {
             let own = env.space.at_contact(dof as usize);
             for ((y, inertial_compliance), own) in self
                 .solved
                 .iter_mut()
-                .zip(&self.inertial_compliance)
+                .zip(&self.modal.inertial_compliance)
                 .zip(own)
             {
                 *y -= inertial_compliance * own * force;
@@ -50,8 +56,10 @@ impl Preconditioner {
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
         let rows = env.space.rows();
         accumulate_rows(isa, pool, env.space.modes(), rows, &self.solved, false, q)?;
-        let dofs = env.prior.stored_dofs(&self.dofs, &mut self.stored)?;
-        let loads = (dofs, self.forces.as_slice());
+        let dofs = env
+            .prior
+            .stored_dofs(&self.contact.dofs, &mut self.contact.stored)?;
+        let loads = (dofs, self.contact.forces.as_slice());
         env.prior.response.accumulate(isa, pool, loads, true, q)
     }
 
@@ -73,13 +81,14 @@ impl Preconditioner {
             }
             let target = target(index);
             for axis in 0..3 {
-                self.at_contact[slot] = target[axis] - u[3 * node as usize + axis];
+                self.contact.moved[slot] = target[axis] - u[3 * node as usize + axis];
                 slot += 1;
             }
         }
         if slot > 0 {
-            self.compliance
-                .solve(isa, &self.at_contact, &mut self.forces);
+            self.contact
+                .compliance
+                .solve(isa, &self.contact.moved, &mut self.contact.forces);
         }
         self.solved.fill(0.0);
         self.spread(env)?;
@@ -88,19 +97,19 @@ impl Preconditioner {
 
     /// For each natural mode what inertia takes off its part of the compliance, mm/mN.
     pub fn inertial_compliance(&self) -> &[f32] {
-        &self.inertial_compliance
+        &self.modal.inertial_compliance
     }
 
     /// `coordinates += A_k f` of forces `f` (mN) on degrees of freedom with columns.
     pub fn add_load(&mut self, env: Env<'_>, dofs: &[u32], forces: &[f32]) -> Result<()> {
-        let count = self.inertial_compliance.len();
+        let count = self.modal.inertial_compliance.len();
         self.solved.fill(0.0);
         for (&dof, force) in dofs.iter().zip(forces) {
             let own = env.space.at_contact(dof as usize);
             for ((y, inertial_compliance), own) in self
                 .solved
                 .iter_mut()
-                .zip(&self.inertial_compliance)
+                .zip(&self.modal.inertial_compliance)
                 .zip(own)
             {
                 *y -= inertial_compliance * own * force;
@@ -111,20 +120,20 @@ impl Preconditioner {
         let natural = &self.solved[..count];
         let modes = env.space.modes();
         accumulate_rows(isa, pool, modes, rows, natural, true, q)?;
-        let dofs = env.prior.stored_dofs(dofs, &mut self.stored)?;
+        let dofs = env.prior.stored_dofs(dofs, &mut self.contact.stored)?;
         (env.prior.response).accumulate(isa, pool, (dofs, forces), true, q)
     }
 
     /// `coordinates = -N diag(1 / (m (w² + kappa))) N^T r` of a residual `[K,3]`, µN, that is zero at held nodes.
     pub fn move_natural(&mut self, env: Env<'_>, r: &[f32]) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
-        let count = self.inertial_compliance.len();
+        let count = self.modal.inertial_compliance.len();
         self.project(env, r)?;
         let q = &mut self.coordinates;
         let (modes, rows) = (env.space.modes(), &env.space.rows()[..count]);
         let natural = &mut self.on_modes[..count];
         row_dots(isa, pool, modes, rows, q, natural)?;
-        for (value, moved) in natural.iter_mut().zip(&self.moved_freely) {
+        for (value, moved) in natural.iter_mut().zip(&self.modal.moved_freely) {
             *value *= -moved;
         }
         Ok(accumulate_rows(isa, pool, modes, rows, natural, false, q)?)
@@ -136,7 +145,7 @@ impl Preconditioner {
             env.isa,
             env.pool,
             &env.prior.basis(),
-            &self.starts,
+            &self.basis.starts,
             r,
             &mut self.coordinates,
         )?)
@@ -148,7 +157,7 @@ impl Preconditioner {
             env.isa,
             env.pool,
             &env.prior.basis(),
-            &self.plan,
+            &self.basis.plan,
             &self.coordinates,
             to,
         )?)
@@ -160,7 +169,7 @@ impl Preconditioner {
             env.isa,
             env.pool,
             &env.prior.basis(),
-            &self.domain,
+            &self.basis.domain,
             &self.coordinates,
             to,
         )?)
@@ -170,7 +179,7 @@ impl Preconditioner {
     pub fn on_natural(&mut self, env: Env<'_>, r: &[f32], out: &mut [f32]) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
         let q = &mut self.coordinates;
-        project_field(isa, pool, &env.prior.basis(), &self.starts, r, q)?;
+        project_field(isa, pool, &env.prior.basis(), &self.basis.starts, r, q)?;
         let rows = &env.space.rows()[..out.len()];
         Ok(row_dots(isa, pool, env.space.modes(), rows, q, out)?)
     }
@@ -183,7 +192,7 @@ impl Preconditioner {
         let modes = env.space.modes();
         accumulate_rows(isa, pool, modes, rows, y, false, q)?;
         let basis = env.prior.basis();
-        decode_rows(isa, pool, &basis, &self.plan, q, out)?;
+        decode_rows(isa, pool, &basis, &self.basis.plan, q, out)?;
         mask_held(&env.held.is, out);
         Ok(())
     }
@@ -195,7 +204,7 @@ impl Preconditioner {
             env.isa,
             env.pool,
             &basis,
-            &self.plan,
+            &self.basis.plan,
             &self.coordinates,
             scratch,
         )?;

@@ -3,10 +3,8 @@
 //! The laws of the elements say nothing of what is inside out, so that no iteration leads out of it: a step that took such a state over would be the start of
 //! others (`docs/decisions/039-sound-states.md`).
 
-use super::Iterate;
-use crate::contact::ContactProblem;
-use crate::corrections::input::{Input, Report, SolverContext};
-use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
+use super::{Iterate, ToolStep};
+use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
 
 /// How often the way from rest to a guess is halved until its end has no inverted element.
@@ -14,60 +12,50 @@ const HALVES: u32 = 8;
 /// Smallest det F of a state from rest that iterations begin with: one at the limit leaves them no way.
 const BEGUN_DET: f32 = 0.2;
 
-impl ImplicitSolver {
+impl ToolStep<'_> {
     /// Whether the step must not end inside out where another state is known. Tools alone may: they find tissue that is inside out, and lose it where it
     /// stays as it was; ties and loads act on it for as long as they last.
-    pub(super) fn must_be_sound(
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &ContactProblem,
-    ) -> bool {
-        let is_moved = input.load.is_some() || !context.corrections.groups.is_empty();
-        is_moved || problem.tied.has_any()
+    pub(super) fn must_be_sound(&self) -> bool {
+        let is_moved = self.input.load.is_some() || !self.context.corrections.groups.is_empty();
+        is_moved || self.problem.tied.has_any()
     }
 
     /// Iterates from the last state, or where that has inverted elements, too, from a part of the way from rest to the guess; returns the length of what is left
     /// unbalanced near the tools. With tools alone a last state with inverted elements, or work that is spent, leaves the guess.
-    pub(super) fn recover(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<f64> {
-        let was_sound = self.motion.min_det >= SMALLEST_DET && !input.still;
-        if Self::must_be_sound(context, input, problem) {
-            problem.work.renew();
-        } else if !was_sound || problem.work.is_spent() {
+    pub(super) fn recover(&mut self, at: &mut Iterate<'_>) -> Result<f64> {
+        let was_sound = self.solver.motion.min_det >= SMALLEST_DET && !self.input.still;
+        if self.must_be_sound() {
+            self.problem.work.renew();
+        } else if !was_sound || self.problem.work.is_spent() {
             return Ok(f64::INFINITY);
         }
         if was_sound {
-            self.stay(context, input, problem, at, report)?;
-            if !context.corrections.groups.is_empty() {
-                self.lift(context, input, Some(input.last), at.u)?;
-                self.evaluate(context, input, at, report)?;
+            self.stay(at)?;
+            if !self.context.corrections.groups.is_empty() {
+                self.solver
+                    .lift(self.context, self.input, Some(self.input.last), at.u)?;
+                self.evaluate(at)?;
             }
         } else {
             // What the last state and this one make of a velocity is none.
-            report.fell_back = true;
-            problem.kept.take_guess(&mut problem.next);
-            at.u.copy_from_slice(&self.guess);
-            self.d.fill(0.0);
-            let mut rest = std::mem::take(&mut self.d);
-            let lifted = self.lift(context, input, None, &mut rest);
-            self.d = rest;
+            self.report.fell_back = true;
+            self.problem.kept.take_guess(&mut self.problem.next);
+            at.u.copy_from_slice(&self.solver.fields.guess);
+            self.solver.fields.d.fill(0.0);
+            let mut rest = std::mem::take(&mut self.solver.fields.d);
+            let lifted = self.solver.lift(self.context, self.input, None, &mut rest);
+            self.solver.fields.d = rest;
             lifted?;
             for _ in 0..HALVES {
-                problem.next.scale_forces(0.5);
-                let pairs = at.u.iter_mut().zip(&self.d);
+                self.problem.next.scale_forces(0.5);
+                let pairs = at.u.iter_mut().zip(&self.solver.fields.d);
                 pairs.for_each(|(u, rest)| *u = 0.5 * (*u + rest));
-                self.evaluate(context, input, at, report)?;
+                self.evaluate(at)?;
                 if at.det >= BEGUN_DET {
                     break;
                 }
             }
         }
-        self.improve_loaded(context, input, problem, at, report)
+        self.improve_loaded(at)
     }
 }

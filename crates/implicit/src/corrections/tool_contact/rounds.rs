@@ -2,11 +2,10 @@
 
 use crate::clock::Instant;
 
-use super::{Iterate, is_sound, is_spent, sunk};
+use super::{Iterate, ToolStep, is_sound, is_spent, sunk};
 use crate::contact::ContactProblem;
-use crate::corrections::input::{Input, Report, SolverContext};
 use crate::corrections::local::{Base, LocalSolver, StepContext};
-use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
+use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
 use crate::memory;
 
@@ -34,78 +33,74 @@ struct Made {
     is_enough: bool,
 }
 
-impl ImplicitSolver {
+impl ToolStep<'_> {
     /// The iterations from a guess; returns the length of what they left unbalanced near the tools.
-    pub(super) fn improve_loaded(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<f64> {
+    pub(super) fn improve_loaded(&mut self, at: &mut Iterate<'_>) -> Result<f64> {
         let mut made = Made::default();
         if at.det < SMALLEST_DET {
-            report.residual = 1.0;
+            self.report.residual = 1.0;
             return Ok(f64::INFINITY);
         }
-        if problem.work.is_spent() {
+        if self.problem.work.is_spent() {
             // No iteration would begin, and its base takes as long as several.
-            report.residual = 1.0;
+            self.report.residual = 1.0;
             return Ok(0.0);
         }
         loop {
-            self.begin_round(context, input, problem, at)?;
-            self.improve_round(context, input, problem, at, (&mut made, report))?;
-            self.end_round(context, input, problem, at, report)?;
-            let most = input.enough.iterations;
+            self.begin_round(at)?;
+            self.improve_round(at, &mut made)?;
+            self.end_round(at)?;
+            let most = self.input.enough.iterations;
             // A tool that was put elsewhere comes out of the tissue over a few steps: none of them is worth another base.
-            let is_last = made.iterations >= most || problem.ways.has_leapt;
-            if made.is_enough || is_last || problem.work.is_spent() {
+            let is_last = made.iterations >= most || self.problem.ways.has_leapt;
+            if made.is_enough || is_last || self.problem.work.is_spent() {
                 break;
             }
-            self.evaluate(context, input, at, report)?;
+            self.evaluate(at)?;
         }
-        let far_moved_mm = self.local.as_ref().map_or(0.0, |local| local.far_moved_mm);
+        let far_moved_mm = self
+            .solver
+            .local
+            .as_ref()
+            .map_or(0.0, |local| local.measured.far_moved_mm);
         if at.det < LOOKED_AT_DET || far_moved_mm > LOOKED_AT_MM {
-            self.evaluate(context, input, at, report)?;
+            self.evaluate(at)?;
         }
-        report.residual = (made.size / made.start.max(f64::MIN_POSITIVE)) as f32;
-        if let Some(local) = &self.local {
-            report.far_mm = local.far_mm;
+        self.report.residual = (made.size / made.start.max(f64::MIN_POSITIVE)) as f32;
+        if let Some(local) = &self.solver.local {
+            self.report.far_mm = local.measured.far_mm;
             // What a leap does to the far nodes says nothing of the reach.
-            if !problem.ways.has_leapt {
-                report.level = local.next_level(at.u);
+            if !self.problem.ways.has_leapt {
+                self.report.level = local.next_level(at.u);
             }
         }
         Ok(made.size)
     }
 
     /// Iterations from one base.
-    fn improve_round(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &mut Iterate<'_>,
-        (made, report): (&mut Made, &mut Report),
-    ) -> Result<()> {
-        made.size = self.unbalanced(problem)?;
+    fn improve_round(&mut self, at: &mut Iterate<'_>, made: &mut Made) -> Result<()> {
+        made.size = self.unbalanced()?;
         if made.iterations == 0 {
             made.start = made.size;
         }
         let first = made.iterations;
         made.is_enough = true;
-        while made.iterations < input.enough.iterations {
-            let until = input.enough.until;
+        while made.iterations < self.input.enough.iterations {
+            let until = self.input.enough.until;
             let late = until.is_some_and(|until| Instant::now() >= until);
-            let spent = late || is_spent(input, problem, report, input.enough.iterations);
-            let spent = problem.work.is_spent() || (made.iterations > 0 && spent);
+            let spent = late
+                || is_spent(
+                    self.input,
+                    self.problem,
+                    &self.report,
+                    self.input.enough.iterations,
+                );
+            let spent = self.problem.work.is_spent() || (made.iterations > 0 && spent);
             if spent || !is_sound(made.size, at.det) {
                 return Ok(());
             }
-            let better = self.improve_at(context, input, problem, at, 1.0)?;
-            report.iterations += 1;
+            let better = self.improve_at(at, 1.0)?;
+            self.report.iterations += 1;
             made.iterations += 1;
             // A failure forgets the pairs, so that the next direction is another one: where that fails too, nothing helps.
             made.failed = if better { 0 } else { made.failed + 1 };
@@ -114,15 +109,23 @@ impl ImplicitSolver {
             }
             // What is left to go: the last move, less by as much as the residual is, as if the moves were a geometric series.
             let before = made.size;
-            made.size = self.unbalanced(problem)?;
-            let moved = f64::from(self.local.as_ref().map_or(0.0, |local| local.moved_mm));
-            report.remaining_mm = (moved * made.size / before.max(f64::MIN_POSITIVE)) as f32;
-            if self.suffices(made.iterations, report.remaining_mm, input.enough) {
+            made.size = self.unbalanced()?;
+            let moved = f64::from(
+                self.solver
+                    .local
+                    .as_ref()
+                    .map_or(0.0, |local| local.measured.moved_mm),
+            );
+            self.report.remaining_mm = (moved * made.size / before.max(f64::MIN_POSITIVE)) as f32;
+            if self
+                .solver
+                .suffices(made.iterations, self.report.remaining_mm, self.input.enough)
+            {
                 return Ok(());
             }
             // Tools that slide out of the inside nodes push on what the iterations know from the modes alone.
-            let holds = (self.local.as_ref())
-                .is_none_or(|local| local.holds_loads(problem, &context.env().held.is));
+            let holds = (self.solver.local.as_ref())
+                .is_none_or(|local| local.holds_loads(self.problem, &self.context.env().held.is));
             if !holds || made.iterations - first == ROUND {
                 made.is_enough = false;
                 return Ok(());
@@ -132,20 +135,14 @@ impl ImplicitSolver {
     }
 
     /// Makes `at` the base of local iterations.
-    pub(super) fn begin_round(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &Iterate<'_>,
-    ) -> Result<()> {
-        let env = context.env();
-        let nodes = problem.reached(&env.held.is);
+    pub(super) fn begin_round(&mut self, at: &Iterate<'_>) -> Result<()> {
+        let env = self.context.env();
         // The reach of the published state, not of the round before: a step that is made again reaches as far.
-        let level = self.motion.level as usize;
-        let (local, mut step) = self.local_solver(context, input)?;
-        local.level = level;
-        memory::replace(&mut local.touched, nodes, "local iterations")?;
+        let level = self.solver.motion.level as usize;
+        let (local, mut step, problem) = self.local_solver()?;
+        let nodes = problem.reached(&env.held.is);
+        local.reach.level = level;
+        memory::replace(&mut local.reach.touched, nodes, "local iterations")?;
         let base = Base {
             u: at.u,
             residual: at.g,
@@ -154,67 +151,52 @@ impl ImplicitSolver {
     }
 
     /// The state of the iterations into `at`, whose residual is not known then.
-    pub(super) fn end_round(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &ContactProblem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-    ) -> Result<()> {
-        let mut q = std::mem::take(&mut self.q);
-        let (local, mut step) = self.local_solver(context, input)?;
+    pub(super) fn end_round(&mut self, at: &mut Iterate<'_>) -> Result<()> {
+        let mut q = std::mem::take(&mut self.solver.fields.q);
+        let (local, mut step, _) = self.local_solver()?;
         // Here the base, `t` and the modes become one field again.
         let result = local.settle(&mut step, at.g, &mut q, at.u);
-        self.q = q;
+        self.solver.fields.q = q;
         result?;
         // What loads do far from the tools is not in the span of the iterations. What has been let go has moved before them, and is near.
-        match input.load.is_some() && context.held.let_go == 0 {
-            true => self.move_whole(context, input, problem, at, report, FAR_MM),
+        match self.input.load.is_some() && self.context.held.let_go == 0 {
+            true => self.move_whole(at, FAR_MM),
             false => Ok(()),
         }
     }
 
     /// One local iteration with the tools at part `way` of their way; tells whether it leads to another state.
-    pub(super) fn improve_at(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        at: &mut Iterate<'_>,
-        way: f32,
-    ) -> Result<bool> {
-        let (local, mut step) = self.local_solver(context, input)?;
+    pub(super) fn improve_at(&mut self, at: &mut Iterate<'_>, way: f32) -> Result<bool> {
+        let input = self.input;
+        let (local, mut step, problem) = self.local_solver()?;
         let deep = |problem: &mut ContactProblem, u: &[f32]| sunk(input, problem, u, way);
         let gain = local.improve(&mut step, problem, at.u, way, deep)?;
         if gain.is_better {
-            at.det = local.det;
+            at.det = local.measured.det;
             at.sunk_mm = (way >= 1.0).then_some(gain.sunk_mm);
         }
         Ok(gain.is_better)
     }
 
     /// What is out of balance near the tools.
-    fn unbalanced(&mut self, problem: &ContactProblem) -> Result<f64> {
-        match &mut self.local {
-            Some(local) => local.unbalanced(problem),
+    fn unbalanced(&mut self) -> Result<f64> {
+        match &mut self.solver.local {
+            Some(local) => local.unbalanced(self.problem),
             None => Ok(0.0),
         }
     }
 
-    fn local_solver<'a>(
-        &'a mut self,
-        context: SolverContext<'a>,
-        input: &'a Input<'a>,
-    ) -> Result<(&'a mut LocalSolver, StepContext<'a>)> {
-        let local = LocalSolver::made(&mut self.local, context)?;
+    /// What iterates near the tools, what it is lent, and the tools' contact.
+    fn local_solver(&mut self) -> Result<(&mut LocalSolver, StepContext<'_>, &mut ContactProblem)> {
+        let solver = &mut *self.solver;
+        let local = LocalSolver::made(&mut solver.local, self.context)?;
         let step = StepContext {
-            context,
-            input,
-            preconditioner: &mut self.preconditioner,
-            scratch: &mut self.scratch,
-            drift: &self.drift,
+            context: self.context,
+            input: self.input,
+            preconditioner: &mut solver.preconditioner,
+            scratch: &mut solver.balance.scratch,
+            drift: &solver.balance.drift,
         };
-        Ok((local, step))
+        Ok((local, step, self.problem))
     }
 }

@@ -1,24 +1,21 @@
 //! Modes of the whole body, and of what a support group held, in a step that tools drive.
 
-use super::Iterate;
-use crate::contact::ContactProblem;
-use crate::corrections::input::{Input, Report, SolverContext};
+use super::{Iterate, ToolStep};
 use crate::corrections::precondition::mask_held;
-use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
+use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
 
-impl ImplicitSolver {
+impl ToolStep<'_> {
     /// Moves the whole modes by what is out of balance on them. A move of more than `unchecked_mm` is taken back unless it leaves less of that: a tool that has
     /// lost the balance pushes with more than the body's softest modes bear.
-    pub(super) fn move_whole(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &ContactProblem,
-        at: &mut Iterate<'_>,
-        report: &mut Report,
-        unchecked_mm: f32,
-    ) -> Result<()> {
+    pub(super) fn move_whole(&mut self, at: &mut Iterate<'_>, unchecked_mm: f32) -> Result<()> {
+        let ToolStep {
+            solver,
+            context,
+            input,
+            problem,
+            report,
+        } = self;
         let env = context.env();
         let unbalanced = |g: &[f32], to: &mut Vec<f32>| {
             to.copy_from_slice(g);
@@ -30,7 +27,7 @@ impl ImplicitSolver {
             });
             mask_held(&env.held.is, to);
         };
-        self.with_fields(|solver, [from, scratch, left]| {
+        solver.with_fields(|solver, [from, scratch, left]| {
             from.copy_from_slice(at.u);
             unbalanced(at.g, left);
             (solver.preconditioner).move_whole(env, left, scratch, at.u)?;
@@ -41,15 +38,15 @@ impl ImplicitSolver {
             if moves.fold(0.0, f32::max) <= unchecked_mm {
                 return Ok(());
             }
-            let before = solver.size(env, left)?;
-            solver.evaluate(context, input, at, report)?;
+            let before = solver.balance.size(env, left)?;
+            at.evaluate(solver, *context, input.last, report)?;
             unbalanced(at.g, left);
-            let after = solver.size(env, left)?;
+            let after = solver.balance.size(env, left)?;
             if at.det > SMALLEST_DET && after < before {
                 return Ok(());
             }
             at.u.copy_from_slice(from);
-            solver.evaluate(context, input, at, report)
+            at.evaluate(solver, *context, input.last, report)
         })
     }
 }
