@@ -59,6 +59,7 @@ impl Core {
         let taken = self.maker.take(published, &input, &mut stats)?;
         let was_given = taken.given.is_some();
         let states = &self.maker.states;
+        // A sleeping scene costs nothing until something of a step asks for tissue: contact, a tool near it, loads, a host's own state.
         let is_idle = states.incoming.is_empty() && !was_given && !taken.near && !taken.has_load;
         if states.counters.sleeping && is_idle {
             self.fit_published(published)?;
@@ -66,6 +67,7 @@ impl Core {
             self.publish_rest(published);
             self.maker.loads.commit();
         } else {
+            // May fail: then `states.next` is left as scratch, and all that is published and remembered is that of the last step.
             let replaced = self.maker.make(published, &taken, start, &mut stats)?;
             self.fit_published(published)?;
             self.maker.states.counters.time_s = input.time_s;
@@ -80,6 +82,7 @@ impl Core {
         stats.sleeping = counters.sleeping;
         stats.max_displacement_mm = counters.max_displacement;
         stats.contact_count = self.maker.states.contact.len() as u64;
+        // The poses that the contact was made for are as old as the step took: a hand reckons with it.
         self.hands.took_s = start.elapsed().as_secs_f64();
         self.hands.publish(&self.maker, published);
         if let Some(out) = out {
@@ -130,6 +133,7 @@ impl StepMaker {
         let count = body.mesh.node_count();
         input.check()?;
         body.check_cut(input)?;
+        // A dense field has the intact mesh's nodes; a list may name the copies that cuts have made, too.
         let nodes = [body.intact_mesh().node_count(), count];
         input.contact.gather(&mut self.states.incoming, nodes)?;
         let shared = lock_read(published);
@@ -144,6 +148,7 @@ impl StepMaker {
         let corrected = self.corrected.as_ref();
         let velocity = corrected.map(|own| &*own.solver.motion.velocity);
         let moves = (last, velocity);
+        // Loads before tools: a scene that refuses them has not yet forgotten the tools of the last step.
         let acts = (self.loads).take(body, &self.machine, &input.loads, moves)?;
         stats.check_ms = watch.lap();
         let was_driven = self.states.counters.driven;
@@ -171,6 +176,7 @@ impl StepMaker {
         stats: &mut SceneStats,
     ) -> Result<bool> {
         let given = taken.given;
+        // Tools make the state by the elements; where none touches, the model makes it, and the elements correct what is prescribed.
         if !self.drive(published, taken.near, start, stats)? {
             let learned =
                 self.learns() && (self.corrected.is_none() || self.states.incoming.is_empty());

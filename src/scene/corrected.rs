@@ -109,6 +109,7 @@ impl Corrector {
     ) -> Result<Option<Corrector>> {
         let entry = model.manifest.corrections.as_ref();
         let own = OwnPace::new(model, options)?;
+        // Three ways to say enough: a count, a target in mm, or a time; the first that is reached ends the iterations.
         let (most, target_mm, budget_us) = match options.corrections {
             Corrections::None => return none(own, options.substeps),
             Corrections::Recommended | Corrections::RecommendedWithin { .. } => match entry {
@@ -185,6 +186,7 @@ impl Corrector {
             Error::Unsupported("corrections: the bundle has no linear response".into())
         })?;
         let integrator = own.integrator(corrections.time_step.integrator);
+        // `K + kappa M` and its inverse blocks depend on the length of the step: the bundle's are shared, a scene's own are its own.
         let time_step = match own.is_some() {
             false => Arc::clone(&corrections.time_step),
             true => Arc::new(corrections.time_step(

@@ -63,6 +63,7 @@ impl Core {
             Some(cut) => cut.body.clone(),
             None => maker.body.whole_body()?,
         };
+        // A cut goes through the tissue where it is now, not where it was meshed.
         let positions = maker.body.positions(&lock_read(published).last)?;
         // Beside its lists the topology makes many small parts.
         memory::probe(body.most_bytes(), SCENE)?;
@@ -71,6 +72,7 @@ impl Core {
             return Ok(change);
         }
         let first = maker.body.mesh.node_count();
+        // A copy may be of a copy that the same operation made: followed back to a node that was there before.
         let source = |node: usize| {
             let mut node = node;
             while node >= first {
@@ -78,6 +80,7 @@ impl Core {
             }
             node
         };
+        // The next core is made whole beside this one: memory may run out until the two change places.
         let mut next = self.with_body(Some(body))?;
         let mut shown = Published::rest(&next)?;
         {

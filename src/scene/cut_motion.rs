@@ -22,6 +22,7 @@ impl Corrector {
     ) -> Result<()> {
         let len = 3 * body.mesh.node_count();
         let was = &old.solver.motion;
+        // The pairs of before are of another body: the first step after a cut begins with none.
         let mut motion = Motion {
             velocity: memory::zeros(len, WHAT)?,
             velocity_before: memory::zeros(len, WHAT)?,
@@ -42,6 +43,7 @@ impl Corrector {
         // Inertia is that of the mass which is at the node now, and the loads with it.
         let (now, then) = (body.model.corrections()?, before.model.corrections()?);
         let (mass, mass_then) = (&now.body.mass, &then.body.mass);
+        // A copy has a part of its source's mass; fields per node that carry mass are shared out by it, so that their sum stays.
         let part = |node: usize| mass[node] / mass_then[source(node)].max(f32::MIN_POSITIVE);
         for field in [&mut motion.inertia, &mut motion.load] {
             let rows = field.chunks_exact_mut(3).enumerate();

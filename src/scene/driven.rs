@@ -30,11 +30,13 @@ impl StepMaker {
         let Some(problem) = &self.tools.problem else {
             return Ok(false);
         };
+        // A host that gives nodes in contact drives by them, whatever tools it had before.
         let is_prescribed = !self.states.incoming.is_empty();
         let is_cut = self.body.cut.is_some();
         if is_prescribed || (problem.ways.tools.is_empty() && !near && !is_cut) {
             return Ok(false);
         }
+        // Without corrections there is one solve on the linear response at rest, and the model answers to it as to a collision field.
         if self.corrected.is_none() {
             return self.drive_linear(published, near, stats);
         }
@@ -126,6 +128,7 @@ impl StepMaker {
         // contacts read it there.
         let touched = problem.touched(&self.body.held);
         states.incoming.take_nodes(touched, &states.next.field);
+        // A substep is a step to the contact: speeds are those of its length.
         let made_of = report.substeps.max(1) as f32;
         let step_s = self.body.step_s() as f32 / made_of;
         let covered = corrected.covers_tools(&self.body.model);

@@ -24,6 +24,7 @@ impl Hands {
         }
         self.forget_gone();
         let shared = lock_read(published);
+        // Only a scene that corrects a bundle with linear response has any: `add_hand` has asked.
         let Some(step) = stepped(maker, &shared, self.took_s) else {
             return;
         };

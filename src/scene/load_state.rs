@@ -55,6 +55,7 @@ impl LoadState {
             let sum: f64 = nodes.iter().map(|node| f64::from(node[axis])).sum();
             (sum / nodes.len().max(1) as f64) as f32
         });
+        // In a cut body a node of an element that has changed may hold no tissue any more: what acts on it goes to the copies that carry its tissue.
         let mut takes = Vec::new();
         if let Some(body) = body {
             takes = memory::filled(mesh.node_count(), 1.0, WHAT)?;
@@ -153,7 +154,9 @@ impl LoadState {
         let carried = pose.map(|pose| Carried::follow(self.last.carried.as_ref(), &pose, step_s));
         next.carried = carried.map(|(carried, _)| carried);
         let carriage = carried.map(|(_, carriage)| carriage);
+        // Gravity in the body's frame, which turns with the support, m/s².
         let acceleration = loads.acceleration(carriage.as_ref());
+        // A blade's push is part of the loads at the end of one step: it acts there once.
         next.pushed.clear();
         let pushed = &self.last.pushed;
         next.acts = loads.acts_with(acceleration)
@@ -161,6 +164,7 @@ impl LoadState {
             || supports::acts(&next.supports)
             || !pushed.is_empty();
         let acceleration = acceleration.map(|a| 1e3 * a);
+        // The modes' guess answers to an even acceleration; of what a moving support adds it takes that of the body's middle.
         next.gravity = acceleration;
         let carriage = carriage.filter(Carriage::acts);
         let carriage = carriage.map(|carriage| carriage.borne());
@@ -177,6 +181,7 @@ impl LoadState {
                 let x = [0, 1, 2].map(|axis| rest[node][axis] + at(u, axis));
                 carriage.at(x, [0, 1, 2].map(|axis| at(v, axis)))
             });
+            // A host gives forces by the intact mesh's nodes, mN; here they are µN, as the residual is.
             let (from, part) = (parent(node), takes.get(node).copied().unwrap_or(1.0));
             for axis in 0..3 {
                 let own = (loads.forces).map_or(0.0, |forces| part * forces[3 * from + axis]);
@@ -184,6 +189,7 @@ impl LoadState {
                 dead[axis] = mass * (acceleration[axis] + borne[axis]) + 1e3 * own + push;
             }
         }
+        // Pressures add up where regions overlap; the last entry is that of the whole domain, for faces that cuts lay open.
         next.pascal.fill(0.0);
         let faces = mesh.surface_faces.as_chunks::<3>().0;
         for (index, pressure) in loads.pressures.iter().enumerate() {
@@ -213,6 +219,7 @@ impl LoadState {
                 )));
             }
         }
+        // Faces under pressure at either end of the step: pressure changes linearly over it.
         self.faces.clear();
         self.pascal.iter_mut().for_each(Vec::clear);
         for (row, corners) in &self.pressed.triangles {

@@ -55,6 +55,7 @@ impl SceneLoads {
         let mass = &body.model.corrections()?.body.mass;
         state.take(loads, &body.mesh, mass, (u, v, body.step_s()))?;
         let acts = state.acts();
+        // On a cut body the answer to gravity is the intact body's, made there once and followed by the copies of nodes.
         if state.turns() {
             follow_turning(body, machine)?;
         }

@@ -169,6 +169,7 @@ impl StepMaker {
         learned: bool,
         stats: &mut SceneStats,
     ) -> Result<()> {
+        // A corrected step under tools has said it just before; a free one has none.
         let used = self.tools.used.take();
         self.watch.compare(&self.body, &self.states, used, stats);
         let shared = lock_read(published);

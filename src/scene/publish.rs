@@ -29,6 +29,7 @@ impl Core {
         let maker = &mut self.maker;
         let Frame { field, points } = &mut maker.states.next;
         maker.shown.points.add_interpolated(1.0, field, points);
+        // Nothing fails from here on: all room was asked for in `fit_published`.
         maker.engine.commit();
         if let Some(corrected) = &mut maker.corrected {
             if replaced {
@@ -39,6 +40,7 @@ impl Core {
         maker.tools.commit();
         maker.loads.commit();
         maker.states.commit(replaced);
+        // The statistics still have the refused state's displacement; the next verdict starts from the one that stands.
         let largest = match replaced {
             true => maker.largest_of_next(),
             false => stats.max_displacement_mm,

@@ -153,6 +153,7 @@ impl Core {
             }
             None => None,
         };
+        // Admitted and put into a core beside this one: a snapshot that turns out wrong leaves the scene as it is.
         let mut next = self.with_body(body)?;
         let shown = RwLock::new(Published::rest(&next)?);
         state.admit(&next.maker)?;

@@ -56,6 +56,7 @@ impl ToolContact {
             Contact::Dense(_) | Contact::Sparse { .. } => false,
         };
         let ties = input.loads.ties;
+        // Which tools the contact problem makes the step with: those of the host, or none where it is asked for the ties or a cut body alone.
         let tools: &[Tool] = match input.contact {
             Contact::Tools(tools) => tools,
             // The elements make each step of a cut body, and of one with ties, as if tools were there.
@@ -73,6 +74,7 @@ impl ToolContact {
                 "instruments: the bundle has no linear response to solve their contact with; pass the nodes that upt_scene_contacts_from_instruments finds".into(),
             ));
         }
+        // From the first tool on: a scene that tools never touch has no room for their contact.
         let problem = made(&mut self.problem, body)?;
         super::ties::place(&mut self.placed_ties, body, input, tools.len())?;
         let rest = &body.mesh.positions;
@@ -209,6 +211,7 @@ impl ToolContact {
         let Some(past) = before.past(false) else {
             return Ok(());
         };
+        // Rows are numbers of samples: a cut gives the surface other samples, and the same point of the tissue another number.
         let mut past = past.copy()?;
         let held = past.tools.iter().flat_map(|held| held.grasp.anchors());
         let pushed = past.forces.iter().map(|force| force.sample);
@@ -233,6 +236,7 @@ impl ToolContact {
             }
             None => false,
         });
+        // Two samples of before may be one now: forces are found by binary search, each once.
         past.forces.sort_unstable_by_key(Force::key);
         past.forces.dedup_by_key(|force| force.key());
         for held in &mut past.tools {

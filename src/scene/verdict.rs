@@ -16,6 +16,7 @@ impl StepMaker {
     pub(super) fn judge(&mut self, stats: &mut SceneStats) -> Result<u32> {
         let mut watch = Stopwatch::start();
         let _span = tracing::trace_span!("guard").entered();
+        // Of the nodes that are decoded: a region leaves the others unknown.
         let max = self.largest_of_next();
         let bound = self.body.model.manifest.envelope.displacement_bound_mm;
         // A load may move the body as far as its bound.
@@ -23,6 +24,7 @@ impl StepMaker {
             true => bound,
             false => self.states.incoming.max_push(),
         };
+        // Finite, within the bundle's bound, and no farther beyond the last state than its cause explains.
         let mut verdict = guard::judge(bound, max, self.states.counters.max_displacement, cause);
         if self.options.check_inversion
             && verdict & flag::NON_FINITE == 0

@@ -173,6 +173,7 @@ impl State {
             (shared.last.field, shared.before.field) = (last, before);
         }
         maker.engine.put(records)?;
+        // Loads before history: the solver asks which support groups are held.
         maker.tools.put(&maker.body, tools)?;
         maker.loads.put(&maker.body, acting)?;
         match (&mut maker.corrected, history) {

@@ -22,6 +22,7 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         let mut report = Report::default();
         let rests = |field: &[f32]| field.iter().all(|value| *value == 0.0);
+        // Tissue that relaxes goes on to creep where it has been strained, without any load.
         let pushes = self.relaxing.as_ref().is_some_and(|own| !own.rests());
         // A body at rest that nothing pushes stays there, and costs nothing.
         let is_free = input.load.is_none() && !pushes;
@@ -81,12 +82,14 @@ impl ImplicitSolver {
             context.time_step.integrator.step_s,
             context.time_step.integrator.kappa(),
         );
+        // Each natural mode is an oscillator `y'' + alpha y' + w² y = f`, solved over the step in closed form: BDF2 would damp it, the more the longer the step.
         self.free.ready(context)?;
         let still = input.last;
         // Internal forces of the last state: what the modes swing about is not linear elasticity but the law.
         let (det, _) = self
             .balance
             .residual(context, [still, still, still], g, report)?;
+        // Amplitudes and rates of the modes at the start of the step, and what the law's forces have of each.
         self.measure(context, input, g)?;
         let env = context.env();
         // What the modes lack under BDF2 goes into the inertia of the step, ...
@@ -107,6 +110,7 @@ impl ImplicitSolver {
         self.free.give(|mode| mode.faster(h));
         self.preconditioner
             .of_natural(env, &self.free.values, &mut self.free.faster)?;
+        // Where the oscillators are at the end of the step, less where they were.
         self.free.give(|mode| mode.after(h).0 - mode.place);
         self.preconditioner
             .of_natural(env, &self.free.values, &mut self.fields.d)?;
@@ -191,7 +195,9 @@ impl ImplicitSolver {
     /// Places, velocities, drifts and forces of the modes, from the residual `g` of the last state.
     fn measure(&mut self, context: SolverContext<'_>, input: &Input<'_>, g: &[f32]) -> Result<()> {
         let env = context.env();
+        // A step from a displacement that the host gave has no past: its velocity counts as none.
         let known = if input.still { 0.0 } else { 1.0 };
+        // `N^T M x`: the modes are orthonormal by mass, so that this is what a field has of each.
         let weighted = |solver: &mut ImplicitSolver, field: &[f32], scale: f32| {
             for (i, (q, value)) in solver.fields.q.iter_mut().zip(field).enumerate() {
                 *q = scale * env.body.mass[i / 3] * value;

@@ -63,6 +63,7 @@ impl ImplicitSolver {
             let velocity_before = &motion.velocity_before[range.clone()];
             let mass = &mass[range];
             for i in 0..drift.len() {
+                // As if the step moved nothing: `u_{n+1} = u_n`. What a move adds is `kappa M (u - u_n)`, which is linear.
                 let displacements = [last[i], last[i], before[i]];
                 let [v, a] = bdf2.motion(displacements, [velocity[i], velocity_before[i]]);
                 drift[i] = mass[i] * (a + alpha * v);
@@ -109,6 +110,7 @@ impl ImplicitSolver {
         let (bdf2, alpha) = (Differences::new(step_s, input), damping_per_s as f32);
         let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
         let time = step_s as f32;
+        // In pieces, each by one thread, whose sums are added in their order: the same bits for any number of threads.
         let mut sums = passes::Sums::new(&mut self.balance.partial, next.len(), 2);
         let parts = sums.parts();
         let own = &mut self.next;
@@ -134,6 +136,7 @@ impl ImplicitSolver {
             }
             // SAFETY: these sums belong to this piece alone.
             let sums = unsafe { parts.part(2 * piece, 2) };
+            // Second differences of displacement and velocity: zero for steady motion.
             sums[0] = passes::sum_of_squares(next.len(), |i| next[i] - 2.0 * last[i] + before[i]);
             sums[1] = passes::sum_of_squares(next.len(), |i| {
                 time * (velocity[i] - 2.0 * velocity_before[i] + bdf2.known * known_before[i])
@@ -141,9 +144,11 @@ impl ImplicitSolver {
         })?;
         let nodes = (next.len() / 3) as f64;
         let [bend, jerk] = [0, 1].map(|at| (sums.total(at) / nodes).sqrt());
+        // Root mean square over the nodes, mm.
         let truncated = libm::hypot(BEND * bend, JERK * jerk);
         self.leave_load()?;
         let own = &mut self.next;
+        // Who knows better sets these after it: this is what a state has that no element was asked of.
         own.min_det = 1.0;
         own.level = 0;
         own.truncated_mm = match truncated.is_finite() {

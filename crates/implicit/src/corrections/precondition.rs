@@ -84,6 +84,7 @@ impl Preconditioner {
                 .filter(|node| env.prior.in_domain[*node as usize]);
             memory::collected(nodes.len(), inside, WHAT)?
         };
+        // `Phi^T (K + kappa M) Phi = G_K + kappa G_M`: both Gram matrices are in the bundle, so another length of step costs no product with a field.
         let galerkin_free = env.space.galerkin(kappa)?;
         Ok(Preconditioner {
             modal: Modal {
@@ -150,6 +151,7 @@ impl Preconditioner {
 
     /// Takes the prescribed nodes (ascending); cheap where they are those of the last call.
     pub fn prescribe(&mut self, env: Env<'_>, nodes: &[u32]) -> Result<()> {
+        // The factors depend on which nodes are prescribed, not on where they go.
         if self.ready && self.nodes == nodes {
             return Ok(());
         }
@@ -209,6 +211,7 @@ impl Preconditioner {
         }
         let (whitened, free) = (&self.contact.whitened, &self.galerkin.free);
         let rows = env.space.rows();
+        // `Psi^T (K + kappa M) Psi = Phi^T (K + kappa M) Phi - 1e3 V^T V` with `V = R^-T Phi_C`: the Schur complement of the contact; 1e3 takes mN to µN.
         let less = self.galerkin.held.factor(env.isa, rows, |upper| {
             upper.copy_from_slice(free);
             subtract_gram(env.isa, whitened, count, 1e3, upper);
@@ -251,11 +254,13 @@ impl Preconditioner {
             .zip(r.as_chunks::<3>().0)
             .zip(blocks)
         {
+            // The first level, node by node: the inverse of the 3 x 3 block in its six numbers, mm/µN.
             let w = DIAGONAL_WEIGHT;
             z[0] += w * (xx * r[0] + xy * r[1] + xz * r[2]);
             z[1] += w * (xy * r[0] + yy * r[1] + yz * r[2]);
             z[2] += w * (xz * r[0] + yz * r[1] + zz * r[2]);
         }
+        // Prescribed and held nodes do not move: on them `P` is zero from both sides, which keeps it symmetric.
         mask(&self.nodes, z);
         mask_held(&env.held.is, z);
         Ok(())

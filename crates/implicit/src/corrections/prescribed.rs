@@ -18,6 +18,7 @@ impl ImplicitSolver {
         let _awake = context.pool.keep_awake();
         self.remember(context, input, false)?;
         let held = &env.held.is;
+        // All room is asked for before the step begins: what follows fails by a panic of a worker alone.
         let forces = 3 * input.contact.len();
         memory::fit(&mut self.next.reaction, forces, "contact forces")?;
         self.balance.nodes.clear();
@@ -25,9 +26,11 @@ impl ImplicitSolver {
         self.balance
             .nodes
             .extend(nodes.filter(|&&node| !held[node as usize]));
+        // A node that is held stays held in contact: it is neither prescribed nor has it a force.
         self.preconditioner.prescribe(env, &self.balance.nodes)?;
         self.expect(context, input)?;
         self.memory.begin();
+        // Pairs of the step before hold at the nodes that are free now; where a node is prescribed they count as zero.
         self.memory.mask(&self.balance.nodes);
         self.prepare(context, input)?;
         let mut report = Report::default();
@@ -66,6 +69,7 @@ impl ImplicitSolver {
         report: &mut Report,
     ) -> Result<f32> {
         let env = context.env();
+        // The contact goes straight from the last state to what the host asks: `u_n + part (c - u_n)`.
         let target = |index: usize| {
             let node = self.balance.nodes[index];
             let c = input.contact.at(node).unwrap_or_default();
@@ -98,6 +102,7 @@ impl ImplicitSolver {
         let env = context.env();
         let held = &env.held.is;
         let reaction = &mut self.next.reaction;
+        // What is out of balance at the contact nodes themselves, µN; `reaction` adds what the free nodes leave, which is little once the iterations end.
         let mut rows = self.balance.at_nodes[1].as_chunks::<3>().0.iter();
         for &node in &contact.nodes {
             let row = match held[node as usize] {
@@ -136,6 +141,7 @@ impl ImplicitSolver {
     ) -> Result<f32> {
         // From an inverted state no path leads back but the one from rest.
         let lost = self.motion.min_det < SMALLEST_DET && !input.still;
+        // Half of what the last state had: a guess that takes more than that in one go is linear where the law is not.
         let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
         let mut parts = 1;
         let mut det = loop {
@@ -155,6 +161,7 @@ impl ImplicitSolver {
             }
             parts *= 2;
         };
+        // Invariant: `u` has its contact at `part - 1` of the way, `g` is its residual and `det` its smallest det F.
         for part in 2..=parts {
             if det > SMALLEST_DET {
                 // One iteration between two parts: the next is linear about a state in balance, not about another guess.

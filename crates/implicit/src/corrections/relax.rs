@@ -23,7 +23,9 @@ impl ImplicitSolver {
         report: &mut Report,
     ) -> Result<()> {
         let env = context.env();
+        // `|r|` of the guess: what the report's residual is a part of.
         let start = self.balance.size(env, g)?;
+        // Invariant: `u`, its residual `g` and its smallest det F belong together at the head of each iteration.
         for iteration in 0..input.enough.iterations {
             let size = self.balance.size(env, g)?;
             let until = input.enough.until;
@@ -34,6 +36,7 @@ impl ImplicitSolver {
             }
             det = self.improve(context, input.last, u, g, det, report)?;
             report.iterations += 1;
+            // What a further iteration would move is told from what this one has moved and how far it has brought the residual down.
             report.remaining_mm = self.remaining(env, g, size)?;
             if self.suffices(iteration + 1, report.remaining_mm, input.enough) {
                 break;
@@ -92,6 +95,7 @@ impl ImplicitSolver {
         report: &mut Report,
     ) -> Result<f32> {
         let env = context.env();
+        // `d = -H r` with `H` the inverse Hessian that the pairs stand for, and `P` where an initial matrix would stand.
         let preconditioner = &mut self.preconditioner;
         let nodes = &self.balance.nodes;
         self.memory.direction(env, g, q, d, |q, z| {
@@ -99,6 +103,7 @@ impl ImplicitSolver {
             preconditioner.apply(env, q, z)
         })?;
         mask(&self.balance.nodes, d);
+        // `r . d` at `t = 0`, nJ: what the line search measures its gain by.
         let mut slope = [0.0];
         dots(
             env.isa,
@@ -112,6 +117,7 @@ impl ImplicitSolver {
         let mut search = LineSearch::new(slope);
         loop {
             let t = search.t;
+            // `q = u + t d`: the state tried.
             passes::shorten(env, u, d, t, q)?;
             let (det_new, slope_new) =
                 self.balance
@@ -120,6 +126,7 @@ impl ImplicitSolver {
                 Tried::Accepted => {
                     self.balance.stand();
                     u.copy_from_slice(q);
+                    // The pair is `s = t d` and `y = r_new - r`; `q` is free to hold `y` once the state has been taken.
                     passes::difference(env, g_new, g, q)?;
                     self.memory.store(env, d, t, q)?;
                     g.copy_from_slice(g_new);

@@ -96,6 +96,7 @@ impl ToolStep<'_> {
             level: self.solver.motion.level as usize,
             ..Report::default()
         };
+        // Out of the solver while they are iterated on; the host's field gets the state only once it is whole.
         let mut u = std::mem::take(&mut self.solver.fields.u);
         let mut g = std::mem::take(&mut self.solver.fields.g);
         let mut at = Iterate {
@@ -181,6 +182,7 @@ impl ToolStep<'_> {
             self.solver
                 .lift(self.context, self.input, Some(self.input.last), at.u)?;
             self.solver.move_freely(env)?;
+            // Parts of the tools' way, for no tool may pass a sample between two looks; and of the load, where its response inverts elements.
             let parts = ways.max(iterated);
             let mut part = 0;
             while part < parts {
@@ -258,6 +260,7 @@ impl ToolStep<'_> {
             start,
         };
         let compliance = compliance(self.context, &self.solver.preconditioner);
+        // The response to the change alone: the coordinates hold that of the forces before.
         let change = self.problem.solve(compliance, state, way)?;
         self.solver
             .preconditioner

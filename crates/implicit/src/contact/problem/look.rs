@@ -73,6 +73,7 @@ impl NearRows {
                 ways.buried[index] = tip.or(ways.buried[index]);
             }
         }
+        // From here on the ways are read only: rows are measured by them.
         let ways = &*ways;
         let mut placed: [Option<Placed>; MAX_TOOLS] = [const { None }; MAX_TOOLS];
         for (index, (tool, from)) in ways.tools.iter().zip(&ways.before).enumerate() {
@@ -151,6 +152,7 @@ impl NearRows {
             row.point = sample.gather(|node| state.position(node));
             row.outward = outward(samples, row.sample, state);
         }
+        // A sample beyond the skin is a row only where the tool has come as near on its way.
         let gauge = Gauge {
             samples,
             ways,
@@ -162,6 +164,7 @@ impl NearRows {
             self.rows
                 .retain(|row| !row.far || moving.contact(row, part).gap <= SKIN_MM);
         }
+        // One solve costs the square of its rows: a tool as large as the organ leaves what lies less deep to the next solve.
         if self.rows.len() > most {
             memory::fit(&mut self.shed, self.rows.len() - most, WHAT)?;
             self.keep_deepest(gauge, state, part, most);

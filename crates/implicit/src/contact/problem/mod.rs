@@ -164,6 +164,7 @@ impl ContactProblem {
         } = self;
         // From here on `next` has the forces, grasps and ties of the last published step, and a step that fails leaves `past` as it was.
         next.take(past)?;
+        // Ties are told from those of the last step by what they join: a tie that goes on stays broken if it broke.
         tied.take(ties, next)?;
         next.tools.truncate(tools.len());
         memory::fit(&mut next.tools, tools.len(), WHAT)?;
@@ -174,9 +175,11 @@ impl ContactProblem {
             u: start,
             start,
         };
+        // Where the host wants them; a tool that thrusts through may be stopped on its way there.
         ways.goals.extend(tools.iter().map(|tool| tool.pose));
         ways.has_leapt = false;
         for (index, tool) in tools.iter().enumerate() {
+            // A tool is known by its place in the list, in each step the same.
             let known = past.tools.get(index).map(|held| held.pose);
             // Farther than that no hand goes in a step: it is another place, and there was no way there.
             let moved = known.filter(|from| tool.body.motion(from, &tool.pose) <= PUT_MM);
@@ -187,6 +190,7 @@ impl ContactProblem {
             ways.buried.push(surface.buried(&tool.body, &from, state));
             let is_quick = tool.body.motion(&from, &tool.pose) > QUICK_MM;
             let is_broad = tool.body.is_broad();
+            // A broad tool that moves slowly is looked for at its place alone: its samples cannot get behind it.
             ways.swept.push(!is_broad || (is_quick && moved.is_some()));
             ways.may_lose.push(false);
             if next.tools.len() <= index {

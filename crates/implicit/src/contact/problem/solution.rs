@@ -168,6 +168,7 @@ impl Solution {
         self.forces.extend(near.rows.iter().map(|row| row.force));
         self.columns.clear();
         self.columns.extend(near.rows.iter().map(|row| row.sample));
+        // The matrix is read for the columns that these rows touch, of which those are known already that the solve before had.
         let own = match compliance.tangent {
             Some(_) => &mut self.responses.tangent,
             None => &mut self.responses.rest,
@@ -184,6 +185,7 @@ impl Solution {
                 &mut at
             }
         };
+        // Work is counted, not timed: the same step costs the same on every machine.
         work.take(READ_WORK * (rows.len() * rows.len()) as u64);
         let moving = gauge.moving(state, part);
         // Only for what is quick or thin: what was put into the tissue may find its way out by any side.
@@ -195,6 +197,7 @@ impl Solution {
                 true => tool.body.finest().max(LEAST_WAY_MM),
                 false => f32::MAX,
             }));
+        // Gaps of curved tools are linearised about where the forces take the samples: twice, and again where that went too far.
         let (mut pass, mut extra) = (0, MOST_REPEATS);
         while pass < LINEARISATIONS {
             self.contacts.clear();
@@ -212,6 +215,7 @@ impl Solution {
                 most_work: most_work.min(work.for_solve()),
                 ..limits
             };
+            // Block Gauss-Seidel from the forces so far: a solve that goes on from a near one takes few sweeps.
             let outcome = self
                 .sweeps
                 .solve(w, &self.contacts, &mut self.forces, limits);

@@ -76,9 +76,11 @@ impl ContactProblem {
             wide: false,
             most: if is_short { FEW_ROWS } else { MOST_ROWS },
         };
+        // Rows with their forces so far: `f` of the state.
         near.look(surface, ways, (tied, next), state, look)?;
         let rows = near.rows.len();
         let forces = rows + kept.before.len() + tied.list.len();
+        // All that may fail comes before the first force changes: a solve that has begun ends.
         solution.fit(rows, rows + near.shed.len() + tied.list.len())?;
         memory::fit(&mut next.forces, forces.max(kept.most()), WHAT)?;
         prescribed.fit(forces)?;
@@ -90,7 +92,9 @@ impl ContactProblem {
             next,
         };
         let (which, at) = ((compliance, time), (state, part));
+        // `f'`, in the order of the rows.
         solution.solve((gauge, near), which, at, (work, is_short))?;
+        // Ascending by tool and sample, as the rows are: later they are found by binary search.
         next.forces.clear();
         for (row, force) in near.rows.iter().zip(&solution.forces) {
             if *force != Vector::ZERO {
@@ -102,6 +106,7 @@ impl ContactProblem {
             }
         }
         let points = tied.points(&surface.samples);
+        // `B^T (f' - f)`, which the tissue has yet to learn of.
         solution.tell_change(points, near, compliance);
         solution.spent += start.elapsed();
         Ok(solution.change())

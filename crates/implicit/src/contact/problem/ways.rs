@@ -92,6 +92,7 @@ impl ToolWays {
             return work.least_parts();
         }
         let parts = self.tools.iter().zip(&self.before).map(|(tool, from)| {
+            // In a part no point of the tool goes farther than half its radius: a sample before it cannot come out behind it.
             let most = (0.5 * tool.body.radius()).clamp(0.5, 2.0);
             (tool.body.motion(from, &tool.pose) / most).ceil()
         });

@@ -29,6 +29,7 @@ impl LocalSolver {
         // The direction for the loads that are there; then what the contact changes at its end, as a second answer of the same preconditioner.
         self.descend(step, problem)?;
         self.solve_contact(step, problem, base, way)?;
+        // What of the change along the direction is linear is computed once here; each part `t` of it then costs the near elements alone.
         let stiff = &mut self.d.stiff;
         step.preconditioner.stiffen(env, &self.d.step.c, stiff)?;
         self.near.linear(env, &self.d.modes, &mut self.d.linear);
@@ -40,6 +41,7 @@ impl LocalSolver {
         loop {
             let t = search.t;
             self.place_at(base, t);
+            // `next` becomes the residual there; `residual` stays that of the state that stands until `accept` exchanges them.
             let det = self.evaluate(step, t)?;
             // `d` is the direction until `accept` scales it: the slope is that of the line, not of the part.
             let slope_new = self.balance.next.over(&self.d.step) - work;
@@ -88,6 +90,7 @@ impl LocalSolver {
         });
         self.take_loads_off(step, problem)?;
         // The two halves of L-BFGS, with the preconditioner where an initial matrix would stand.
+        // Both halves change `reduced` and `d` in place: the first takes off it what the pairs know, the second adds that to the direction.
         let recursion = self.pairs.descend(env.isa, &mut self.balance.reduced);
         self.d.step.clear(&self.near)?;
         self.precondition(step)?;
@@ -134,6 +137,7 @@ impl LocalSolver {
         let env = step.context.env();
         let preconditioner = &*step.preconditioner;
         let (near, room) = (&self.near, &mut self.spare.room);
+        // Places are sorted: core, other inside nodes, free border, held border. So `..core` is the core's part of any list by place.
         let core = 3 * near.core;
         // `B r` in the core, in place; the residual of the core becomes the move that balances it.
         let (t, outer) = self.balance.reduced.r.split_at_mut(core);
@@ -151,6 +155,7 @@ impl LocalSolver {
         self.tangent.factor.solve(env.isa, t);
         self.tangent.factor.take_off(env, near, room, (t, p))?;
         // `G^-1` of what is left to the modes once the core has moved.
+        // `c = G^-1 (p - Phi^T K t)`: `take_off` has taken the core's move off `p`.
         preconditioner.respond_on_modes(env, p, &mut self.spare.solved)?;
         add(1.0, &self.spare.solved, &mut self.d.step.c);
         add(1.0, t, &mut self.d.step.t);
@@ -175,6 +180,7 @@ impl LocalSolver {
     ) -> Result<()> {
         let _span = tracing::trace_span!("contact").entered();
         let env = step.context.env();
+        // The contact is solved where the whole direction leads: `blend` takes part of its change where the line search goes part of the way.
         self.place_at(base, 1.0);
         let state = State {
             rest: step.input.rest,
@@ -199,6 +205,7 @@ impl LocalSolver {
             held: &env.held.is,
             inertia: Some((env.space, step.preconditioner.inertial_compliance())),
         };
+        // `f' - f`: the direction has the loads of before in it already.
         let change = problem.solve(compliance, state, way)?;
         self.spare.loads.clear();
         memory::fit(&mut self.spare.loads, change.dofs.len(), WHAT)?;
@@ -248,6 +255,7 @@ impl LocalSolver {
         let mut square = 0.0f64;
         let rows = self.d.step.t.as_chunks::<3>().0.iter();
         for (t, &node) in rows.zip(&self.near.nodes) {
+            // Weighted by mass, so that a fine mesh near the tool counts no more than its volume does.
             let own: f32 = t.iter().map(|t| t * t).sum();
             square += f64::from(own) * f64::from(env.body.mass[node as usize]);
         }
@@ -267,6 +275,7 @@ impl LocalSolver {
         each_load(problem, &self.near, |place, force| {
             for (axis, force) in force.into_iter().enumerate() {
                 let at = place + axis;
+                // At border nodes only the modes move; at inside ones `t` besides.
                 let mut d = self.d.modes[at];
                 if at < inside {
                     d += self.d.step.t[at];

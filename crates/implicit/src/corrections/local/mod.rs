@@ -145,6 +145,8 @@ impl LocalSolver {
         let env = step.context.env();
         let far = &step.context.corrections.far;
         let rest = step.input.rest;
+        // About the nodes that the tools touch, those where the body has been cut, and those of a support group that is let go: the bundle's columns and modes
+        // know nothing of either of the latter.
         self.reach.about.clear();
         add_centres(
             rest,
@@ -163,6 +165,7 @@ impl LocalSolver {
             .last()
             .map(|record| record.centres.as_slice());
         self.near.choose(rest, last, &self.reach.about, abouts)?;
+        // A near set is dear to make (lists by element, the factor's pattern): it lasts as long as what is touched stays close to its centres.
         if !self.near.is_chosen(self.reach.level) {
             self.pairs.forget_layout();
             self.near.fill(env, far, rest, self.reach.level)?;
@@ -178,10 +181,12 @@ impl LocalSolver {
         self.balance.residual.clear(&self.near)?;
         resize(&mut self.balance.base, 3 * self.near.free)?;
         resize(&mut self.balance.inner, 3 * self.near.free)?;
+        // `p_0 = Phi^T r_0`: of the base, at all nodes.
         step.preconditioner.project(env, base.residual)?;
         let q = &step.preconditioner.coordinates;
         env.on_modes(q, &mut self.balance.base_modes)?;
         self.clusters.begin(far, &self.near, base.u);
+        // From here on `trial` is the base wherever no near node is: only near places are written in an iteration.
         self.balance.trial.copy_from_slice(base.u);
         self.measured.far_det = f32::MAX;
         self.evaluate(step, 0.0)?;
@@ -267,6 +272,7 @@ impl LocalSolver {
         let kappa = env.time_step.integrator.kappa() as f32;
         let rows = inner.as_chunks_mut::<3>().0.iter_mut();
         for (r, &node) in rows.zip(&near.nodes[..near.inside]) {
+            // `kappa M (u - u_n)`, with what the past adds to it in `drift`, µN.
             let inertia = kappa * env.body.mass[node as usize];
             for (axis, r) in r.iter_mut().enumerate() {
                 let at = 3 * node as usize + axis;
@@ -283,6 +289,7 @@ impl LocalSolver {
             let linear = self.now.linear[at] + t * self.d.linear[at];
             *added = inner[at] - self.balance.base[at] - linear;
         }
+        // `Phi^T` of what the near elements have added beyond the linear part, through the coordinates of the blocks that are near.
         let (near, q, p) = (&self.near, &mut self.spare.room.q, &mut self.balance.next.p);
         near.project(env, &self.spare.room.field, q);
         env.on_modes_in(&near.ranges, q, &mut self.spare.on_modes);
@@ -307,6 +314,7 @@ impl LocalSolver {
     ) -> Result<()> {
         let env = step.context.env();
         let preconditioner = &mut *step.preconditioner;
+        // `Phi c` at all nodes, once a round.
         preconditioner.take_coordinates(env, &self.now.step.c)?;
         preconditioner.decode(env, scratch)?;
         for (place, t) in self.now.step.t.as_chunks::<3>().0.iter().enumerate() {
@@ -314,6 +322,7 @@ impl LocalSolver {
             add(1.0, t, &mut scratch[3 * node..][..3]);
         }
         let (near, count) = (&self.near, u.len() / 3);
+        // Far nodes get the preconditioner's first level of the base's residual: a smoothing, for what the modes do not span.
         let fields = (residual, &mut *scratch, u);
         let moved = add_smoothed(
             env,

@@ -17,9 +17,11 @@ impl ToolStep<'_> {
         self.problem.kept.keep_sound(&self.problem.next)?;
         self.problem.kept.take_guess(&mut self.problem.next);
         at.u.copy_from_slice(&self.solver.fields.guess);
+        // First candidate: the guess, pressed on until the tissue is out of the tools.
         let mut left = self.press_on(SUNK_MM, at.u)?;
         self.keep(at)?;
         if left > SUNK_MM {
+            // Second: linear elasticity from rest, with no history but the tools' places.
             self.respond_from_rest(at)?;
             let from_rest = self.press_on(SUNK_MM, at.u)?;
             // No force at all: the tool lies where samples cannot see it, and the tissue is where no tool pushed it.

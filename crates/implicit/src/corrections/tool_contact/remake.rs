@@ -76,6 +76,7 @@ impl ToolStep<'_> {
         if from_published {
             self.solver.begin_pairs();
         }
+        // The problem's `past` and the solver's `motion` are those of the last published step: an attempt leaves both as they were.
         self.balance_loaded(next)?;
         self.problem.finish(state(self.input, next), breaks);
         Ok(())

@@ -46,6 +46,7 @@ impl ToolStep<'_> {
             self.report.residual = 1.0;
             return Ok(0.0);
         }
+        // A round is a base, its iterations, and the field decoded at their end.
         loop {
             self.begin_round(at)?;
             self.improve_round(at, &mut made)?;
@@ -87,6 +88,7 @@ impl ToolStep<'_> {
         made.is_enough = true;
         while made.iterations < self.input.enough.iterations {
             let until = self.input.enough.until;
+            // The host's budget of time; where it has none, only counted work ends a step, and the bits are the same on every machine.
             let late = until.is_some_and(|until| Instant::now() >= until);
             let spent = late
                 || is_spent(

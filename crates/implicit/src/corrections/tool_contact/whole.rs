@@ -38,6 +38,7 @@ impl ToolStep<'_> {
             if moves.fold(0.0, f32::max) <= unchecked_mm {
                 return Ok(());
             }
+            // A large move is worth an evaluation of all elements: it stands only if less is out of balance than before.
             let before = solver.balance.size(env, left)?;
             at.evaluate(solver, *context, input.last, report)?;
             unbalanced(at.g, left);
