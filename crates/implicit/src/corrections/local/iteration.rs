@@ -36,7 +36,7 @@ impl LocalSolver {
         self.measure_direction(env);
         // Along a line the loads do not change, so their work is a constant of the slopes.
         let work = self.work(problem);
-        let slope = self.balance.residual.over(&self.d.step) - work;
+        let slope = self.residuals.residual.over(&self.d.step) - work;
         let mut search = LineSearch::new(slope);
         loop {
             let t = search.t;
@@ -44,15 +44,15 @@ impl LocalSolver {
             // `next` becomes the residual there; `residual` stays that of the state that stands until `accept` exchanges them.
             let det = self.evaluate(step, t)?;
             // `d` is the direction until `accept` scales it: the slope is that of the line, not of the part.
-            let slope_new = self.balance.next.over(&self.d.step) - work;
+            let slope_new = self.residuals.next.over(&self.d.step) - work;
             let sunk_mm = match det > SMALLEST_DET {
-                true => sunk(problem, &self.balance.trial),
+                true => sunk(problem, &self.residuals.trial),
                 false => f32::MAX,
             };
             // An iteration may not lose the contact, unless it had been lost.
             let is_kept = sunk_mm <= 0.5 * SUNK_MM || {
                 self.place_at(base, 0.0);
-                sunk_mm <= sunk(problem, &self.balance.trial)
+                sunk_mm <= sunk(problem, &self.residuals.trial)
             };
             match search.judge(is_kept, slope_new) {
                 Tried::Accepted => {
@@ -83,15 +83,15 @@ impl LocalSolver {
     /// The direction of L-BFGS, without what the contact makes of it.
     fn descend(&mut self, step: &mut StepContext<'_>, problem: &ContactProblem) -> Result<()> {
         let env = step.context.env();
-        self.balance.reduced.take(&self.balance.residual)?;
-        let (near, reduced) = (&self.near, &mut self.balance.reduced);
+        self.residuals.reduced.take(&self.residuals.residual)?;
+        let (near, reduced) = (&self.near, &mut self.residuals.reduced);
         each_load(problem, near, |place, force| {
             add(-1.0, &force, &mut reduced.r[place..])
         });
         self.take_loads_off(step, problem)?;
         // The two halves of L-BFGS, with the preconditioner where an initial matrix would stand.
         // Both halves change `reduced` and `d` in place: the first takes off it what the pairs know, the second adds that to the direction.
-        let recursion = self.pairs.descend(env.isa, &mut self.balance.reduced);
+        let recursion = self.pairs.descend(env.isa, &mut self.residuals.reduced);
         self.d.step.clear(&self.near)?;
         self.precondition(step)?;
         self.pairs.ascend(env.isa, recursion, &mut self.d.step);
@@ -101,7 +101,7 @@ impl LocalSolver {
     /// Takes the work of the modes on the tools' loads off the reduced residual.
     fn take_loads_off(&mut self, step: &StepContext<'_>, problem: &ContactProblem) -> Result<()> {
         let env = step.context.env();
-        let (p, mut is_known) = (&mut self.balance.reduced.p, true);
+        let (p, mut is_known) = (&mut self.residuals.reduced.p, true);
         problem.each_load(
             |node, force| match env.prior.column_for(&env.held.is, node) {
                 Some((column, true)) => {
@@ -140,7 +140,7 @@ impl LocalSolver {
         // Places are sorted: core, other inside nodes, free border, held border. So `..core` is the core's part of any list by place.
         let core = 3 * near.core;
         // `B r` in the core, in place; the residual of the core becomes the move that balances it.
-        let (t, outer) = self.balance.reduced.r.split_at_mut(core);
+        let (t, outer) = self.residuals.reduced.r.split_at_mut(core);
         let rows = outer.as_chunks::<3>().0.iter();
         let places = self.d.step.t[core..].as_chunks_mut::<3>().0.iter_mut();
         for ((t, r), &node) in places.zip(rows).zip(&near.nodes[near.core..]) {
@@ -149,7 +149,7 @@ impl LocalSolver {
             t[1] += DIAGONAL_WEIGHT * (xy * r[0] + yy * r[1] + yz * r[2]);
             t[2] += DIAGONAL_WEIGHT * (xz * r[0] + yz * r[1] + zz * r[2]);
         }
-        let p = &mut self.balance.reduced.p;
+        let p = &mut self.residuals.reduced.p;
         resize(&mut room.field, 3 * near.free)?;
         room.field[..core].copy_from_slice(t);
         self.tangent.factor.solve(env.isa, t);
@@ -184,7 +184,7 @@ impl LocalSolver {
         self.place_at(base, 1.0);
         let state = State {
             rest: step.input.rest,
-            u: &self.balance.trial,
+            u: &self.residuals.trial,
             start: step.input.last,
         };
         // Columns are made as the contact asks for them, so the response changes while the problem reads it: hence the `RefCell`.
@@ -225,8 +225,8 @@ impl LocalSolver {
     /// Adds the response to `loads` to the direction.
     pub(super) fn respond(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
-        self.balance.reduced.clear(&self.near)?;
-        let (near, reduced) = (&self.near, &mut self.balance.reduced);
+        self.residuals.reduced.clear(&self.near)?;
+        let (near, reduced) = (&self.near, &mut self.residuals.reduced);
         for &(dof, force) in &self.spare.loads {
             let node = env.prior.contact_nodes[dof as usize / 3];
             if near.holds(node)
@@ -296,13 +296,13 @@ impl LocalSolver {
         add(t, &self.d.linear, &mut self.now.linear);
         add(t, &self.d.stiff, &mut self.now.stiff);
         // `y` is the change of the residual over the step, `s` the step; the two of them are the pair.
-        self.balance.reduced.take(&self.balance.next)?;
-        self.balance.reduced.add(-1.0, &self.balance.residual);
+        self.residuals.reduced.take(&self.residuals.next)?;
+        self.residuals.reduced.add(-1.0, &self.residuals.residual);
         self.now.step.add(1.0, &self.d.step);
-        // Before the pair is stored: `self.balance.residual` is the new one from here on, and `reduced` still holds the change.
-        std::mem::swap(&mut self.balance.residual, &mut self.balance.next);
+        // Before the pair is stored: `self.residuals.residual` is the new one from here on, and `reduced` still holds the change.
+        std::mem::swap(&mut self.residuals.residual, &mut self.residuals.next);
         let (near, room) = (&self.near, &mut self.spare.room);
-        let pair = (&self.d.step, &self.balance.reduced);
+        let pair = (&self.d.step, &self.residuals.reduced);
         (self.pairs).store(env, near, room, &self.reach.about, pair)
     }
 }

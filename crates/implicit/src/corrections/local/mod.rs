@@ -35,7 +35,7 @@ use self::factor::NearFactor;
 use self::linear::WHAT;
 use self::near::NearSet;
 use self::pairs::Pairs;
-use self::state::{Balance, Measured, Moved, Reach, Spare};
+use self::state::{Measured, Moved, Reach, Residuals, Spare};
 use self::step::{add, dot, resize};
 use super::input::{Input, SolverContext};
 use super::passes::add_smoothed;
@@ -97,7 +97,7 @@ pub struct LocalSolver {
     now: Moved,
     /// The direction.
     d: Moved,
-    balance: Balance,
+    residuals: Residuals,
     pub(super) measured: Measured,
     spare: Spare,
 }
@@ -118,7 +118,7 @@ impl LocalSolver {
             reach: Reach::new()?,
             now: Moved::with_modes(count)?,
             d: Moved::with_modes(count)?,
-            balance: Balance::new(nodes, count)?,
+            residuals: Residuals::new(nodes, count)?,
             measured: Measured::new(env),
             spare: Spare::new(env)?,
         })
@@ -178,25 +178,25 @@ impl LocalSolver {
         self.pairs.lay_out(env, &self.near, &mut self.spare.room)?;
         self.now.clear(&self.near)?;
         self.d.clear(&self.near)?;
-        self.balance.residual.clear(&self.near)?;
-        resize(&mut self.balance.base, 3 * self.near.free)?;
-        resize(&mut self.balance.inner, 3 * self.near.free)?;
+        self.residuals.residual.clear(&self.near)?;
+        resize(&mut self.residuals.base, 3 * self.near.free)?;
+        resize(&mut self.residuals.inner, 3 * self.near.free)?;
         // `p_0 = Phi^T r_0`: of the base, at all nodes.
         step.preconditioner.project(env, base.residual)?;
         let q = &step.preconditioner.coordinates;
-        env.on_modes(q, &mut self.balance.base_modes)?;
+        env.on_modes(q, &mut self.residuals.base_modes)?;
         self.clusters.begin(far, &self.near, base.u);
         // From here on `trial` is the base wherever no near node is: only near places are written in an iteration.
-        self.balance.trial.copy_from_slice(base.u);
+        self.residuals.trial.copy_from_slice(base.u);
         self.measured.far_det = f32::MAX;
         self.evaluate(step, 0.0)?;
-        std::mem::swap(&mut self.balance.residual, &mut self.balance.next);
+        std::mem::swap(&mut self.residuals.residual, &mut self.residuals.next);
         // What the base has is not what has come since.
-        self.balance.base.copy_from_slice(&self.balance.inner);
-        self.balance
+        self.residuals.base.copy_from_slice(&self.residuals.inner);
+        self.residuals
             .residual
             .p
-            .copy_from_slice(&self.balance.base_modes);
+            .copy_from_slice(&self.residuals.base_modes);
         // Of a chunk that is near in part the far elements are looked at one by one where it is bad.
         let forces = &env.body.forces;
         let dets = step.scratch.smallest_by_chunk().iter().enumerate();
@@ -237,8 +237,12 @@ impl LocalSolver {
 
     /// `|r_S - loads|`, µN: what is out of balance near the tools.
     pub(super) fn unbalanced(&mut self, problem: &ContactProblem) -> Result<f64> {
-        memory::replace(&mut self.balance.reduced.r, &self.balance.residual.r, WHAT)?;
-        let (near, r) = (&self.near, &mut self.balance.reduced.r);
+        memory::replace(
+            &mut self.residuals.reduced.r,
+            &self.residuals.residual.r,
+            WHAT,
+        )?;
+        let (near, r) = (&self.near, &mut self.residuals.reduced.r);
         each_load(problem, near, |place, force| {
             add(-1.0, &force, &mut r[place..])
         });
@@ -257,7 +261,7 @@ impl LocalSolver {
                     moved += self.now.step.t[at];
                     along += if t == 0.0 { 0.0 } else { self.d.step.t[at] };
                 }
-                self.balance.trial[from] = base[from] + moved + t * along;
+                self.residuals.trial[from] = base[from] + moved + t * along;
             }
         }
     }
@@ -266,9 +270,9 @@ impl LocalSolver {
     fn evaluate(&mut self, step: &mut StepContext<'_>, t: f32) -> Result<f32> {
         let env = step.context.env();
         let far = &step.context.corrections.far;
-        self.balance.next.clear(&self.near)?;
-        let (near, inner) = (&mut self.near, &mut self.balance.inner);
-        let det = near.internal(&self.balance.trial, inner);
+        self.residuals.next.clear(&self.near)?;
+        let (near, inner) = (&mut self.near, &mut self.residuals.inner);
+        let det = near.internal(&self.residuals.trial, inner);
         let kappa = env.time_step.integrator.kappa() as f32;
         let rows = inner.as_chunks_mut::<3>().0.iter_mut();
         for (r, &node) in rows.zip(&near.nodes[..near.inside]) {
@@ -276,10 +280,10 @@ impl LocalSolver {
             let inertia = kappa * env.body.mass[node as usize];
             for (axis, r) in r.iter_mut().enumerate() {
                 let at = 3 * node as usize + axis;
-                *r += step.drift[at] + inertia * (self.balance.trial[at] - step.input.last[at]);
+                *r += step.drift[at] + inertia * (self.residuals.trial[at] - step.input.last[at]);
             }
         }
-        self.balance
+        self.residuals
             .next
             .r
             .copy_from_slice(&inner[..3 * near.inside]);
@@ -287,17 +291,21 @@ impl LocalSolver {
         resize(&mut self.spare.room.field, 3 * near.free)?;
         for (at, added) in self.spare.room.field.iter_mut().enumerate() {
             let linear = self.now.linear[at] + t * self.d.linear[at];
-            *added = inner[at] - self.balance.base[at] - linear;
+            *added = inner[at] - self.residuals.base[at] - linear;
         }
         // `Phi^T` of what the near elements have added beyond the linear part, through the coordinates of the blocks that are near.
-        let (near, q, p) = (&self.near, &mut self.spare.room.q, &mut self.balance.next.p);
+        let (near, q, p) = (
+            &self.near,
+            &mut self.spare.room.q,
+            &mut self.residuals.next.p,
+        );
         near.project(env, &self.spare.room.field, q);
         env.on_modes_in(&near.ranges, q, &mut self.spare.on_modes);
         self.spare.more_on_modes.copy_from_slice(&self.now.step.c);
         add(t, &self.d.step.c, &mut self.spare.more_on_modes);
         let far_det = (self.clusters).added_on_modes(env, far, &self.spare.more_on_modes, p)?;
         add(1.0, &self.spare.on_modes, p);
-        add(1.0, &self.balance.base_modes, p);
+        add(1.0, &self.residuals.base_modes, p);
         add(1.0, &self.now.stiff, p);
         add(t, &self.d.stiff, p);
         Ok(det.min(far_det).min(self.measured.far_det))

@@ -47,7 +47,7 @@ impl Moved {
 
 /// The residual of the state that stands, of the next one, and of the base.
 #[derive(HeldBytes)]
-pub(in crate::corrections) struct Balance {
+pub(in crate::corrections) struct Residuals {
     /// Of the state that stands, less that of the base at the modes.
     pub residual: Change,
     /// Of the next state.
@@ -63,10 +63,10 @@ pub(in crate::corrections) struct Balance {
     pub trial: Vec<f32>,
 }
 
-impl Balance {
+impl Residuals {
     /// Of a body of so many nodes and modes.
-    pub fn new(nodes: usize, modes: usize) -> Result<Balance> {
-        Ok(Balance {
+    pub fn new(nodes: usize, modes: usize) -> Result<Residuals> {
+        Ok(Residuals {
             residual: Change::with_modes(modes)?,
             next: Change::with_modes(modes)?,
             reduced: Change::with_modes(modes)?,

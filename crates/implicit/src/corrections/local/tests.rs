@@ -155,7 +155,7 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     local.near.linear(env, &local.d.modes, &mut local.d.linear);
     local.place_at(&u, 1.0);
     local.evaluate(&mut step, 1.0).unwrap();
-    let found = local.balance.next.p.clone();
+    let found = local.residuals.next.p.clone();
 
     // The same state of the whole body.
     local.now.step.add(1.0, &local.d.step);
@@ -163,9 +163,9 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     local
         .settle(&mut step, &bench.zero, &mut scratch, &mut whole)
         .unwrap();
-    let at_base = local.balance.base_modes.clone();
-    let (near, r_found) = (local.near.nodes.clone(), local.balance.next.r.clone());
-    let before = local.balance.base.clone();
+    let at_base = local.residuals.base_modes.clone();
+    let (near, r_found) = (local.near.nodes.clone(), local.residuals.next.r.clone());
+    let before = local.residuals.base.clone();
     let inside = local.near.inside;
     let (mut r, still) = (bench.zero.clone(), &bench.zero);
     let mut report = Report::default();
