@@ -169,6 +169,7 @@ impl StepMaker {
         Ok(true)
     }
 
+    /// What the tools feel in `next`, a state that their forces have not made.
     fn finish_tools(&mut self, published: &RwLock<Published>, stats: &mut SceneStats) {
         let shared = lock_read(published);
         let fields = (&*self.states.next.field, &*shared.last.field);

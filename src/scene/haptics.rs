@@ -48,6 +48,7 @@ impl Scene {
 }
 
 impl Core {
+    /// A hand gets the last published state at once, so that it renders before the next step.
     fn add_hand(
         &mut self,
         published: &RwLock<Published>,

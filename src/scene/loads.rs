@@ -186,6 +186,7 @@ pub struct Acting {
 }
 
 impl Acting {
+    /// Nothing acts; one entry more than faces, for the whole domain's pressure.
     pub(super) fn zeros(mesh: &Mesh) -> Result<Acting> {
         Ok(Acting {
             dead: memory::zeros(mesh.positions.len(), WHAT)?,
@@ -198,6 +199,7 @@ impl Acting {
         })
     }
 
+    /// Nothing acts any more; the room stays.
     pub(super) fn clear(&mut self) {
         self.dead.fill(0.0);
         self.gravity = [0.0; 3];

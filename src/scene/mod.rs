@@ -186,6 +186,10 @@ impl Scene {
         lock_read(&self.shared.published).last.field.len() / 3
     }
 
+    /// Calls with the core, where no submitted step is in flight and no other thread has it.
+    ///
+    /// # Errors
+    /// [`Error::Busy`], [`Error::Panic`] once one was caught.
     fn with<T>(
         &self,
         call: impl FnOnce(&mut Core, &std::sync::RwLock<Published>) -> Result<T>,

@@ -30,6 +30,7 @@ impl NodePlan {
         NodePlan::of(memory::collected(count, nodes, WHAT)?, table)
     }
 
+    /// Of nodes that are ascending and each once.
     fn of(nodes: Vec<u32>, table: Option<&PriorTable>) -> Result<NodePlan> {
         let rows = table.map(|table| RowPlan::try_region(&table.basis(), &nodes, false));
         Ok(NodePlan {

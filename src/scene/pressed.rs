@@ -17,6 +17,7 @@ pub(super) struct Pressed {
     pub points: Vec<LoadPoint>,
 }
 
+/// The corners of a face in ascending order: two elements that share it have it in different ones.
 fn sorted(mut face: [u32; 3]) -> [u32; 3] {
     face.sort_unstable();
     face

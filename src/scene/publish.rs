@@ -19,6 +19,9 @@ pub const STILL_DISPLACEMENT: f32 = 0.05;
 pub const STILL_CHANGE: f32 = 0.002;
 
 impl Core {
+    /// Publishes `next`: all that was made beside it (records, motion, contact, loads) becomes that of the last step, the scene falls asleep where it is
+    /// quiet, and the frames change places. `was_given`: the step began at a displacement of the host's; `replaced`: the guard has put another state in the
+    /// place of the one that was made. Nothing of it can fail.
     pub(super) fn publish(
         &mut self,
         published: &RwLock<Published>,

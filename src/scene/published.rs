@@ -46,6 +46,7 @@ impl Frame {
         })
     }
 
+    /// The list that a view shows, `[n,3]`, mm, all nodes of the mesh or all points.
     fn values(&self, view: View) -> &[f32] {
         match view {
             View::Points => &self.points,
@@ -188,6 +189,7 @@ impl Published {
         Ok(())
     }
 
+    /// Combines the three states number by number, in the view's order; without an earlier state the one before stands for it.
     fn each(&self, view: View, out: Output<'_, f32>, combine: impl Fn(f32, f32, f32) -> f32) {
         let last = self.last.values(view);
         let before = self.before.values(view);

@@ -105,6 +105,7 @@ impl Scene {
 }
 
 impl Core {
+    /// A recorder whose first lines say with which scene, and in which state, what follows was called.
     fn recorder(&self, published: &RwLock<Published>, every: u32) -> Result<Recorder> {
         let refused = |what: &str| Err(Error::Unsupported(format!("record: {what}")));
         let maker = &self.maker;

@@ -36,6 +36,7 @@ impl Shared {
         self.poisoned.load(Ordering::Acquire)
     }
 
+    /// Calls with the core; a panic poisons the scene, whose state nobody can vouch for any more, and becomes an error.
     fn guarded<T>(
         &self,
         mut core: MutexGuard<'_, Core>,

@@ -26,6 +26,10 @@ pub struct SupportPose {
 }
 
 impl SupportPose {
+    /// The pose, its quaternion of unit length.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`], [`Error::Argument`].
     pub(super) fn checked(&self) -> Result<Pose> {
         pose::checked(self.position, self.rotation).map_err(|error| match error {
             pose::PoseError::NotFinite => Error::NonFinite(format!("support: {error}")),
@@ -65,6 +69,7 @@ pub(super) fn affine(pose: &Pose) -> Affine {
     ]
 }
 
+/// A linear combination of three matrices: BDF2's differences of poses.
 fn combined(parts: [(f64, &Affine); 3]) -> Affine {
     [0, 1, 2].map(|row| {
         [0, 1, 2, 3].map(|column| parts.iter().map(|(part, a)| part * a[row][column]).sum())
@@ -99,6 +104,7 @@ impl Carried {
         }
     }
 
+    /// Whether the way there is none that a support goes in a step.
     fn leaps_to(&self, to: &Pose) -> bool {
         let [x, y, z, i, j, k, w] = self.pose;
         let Ok(from) = pose::checked([x, y, z], [i, j, k, w]) else {

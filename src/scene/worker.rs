@@ -288,6 +288,7 @@ impl Drop for Worker {
     }
 }
 
+/// The worker's thread: waits for an input, steps, tells, until the scene ends.
 fn run(shared: &Shared, signal: &Signal) {
     let mut own = Copied::default();
     let mut slot = signal.lock();

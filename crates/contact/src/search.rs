@@ -120,6 +120,7 @@ impl Search {
     }
 }
 
+/// A sample near a tool, with the nearest point of the tool's surface.
 fn candidate(tool: usize, sample: u32, point: Vector, nearest: Nearest) -> Candidate {
     Candidate {
         tool: tool as u32,

@@ -97,6 +97,7 @@ impl Shape {
     }
 }
 
+/// Refuses a length that is not finite or not above 0, naming its field.
 fn positive(field: &'static str, value: f32) -> Result<(), ShapeError> {
     if value.is_finite() && value > 0.0 && value < LARGEST {
         Ok(())
@@ -128,6 +129,7 @@ fn is_thick_blade(mut half_extents: [f32; 3]) -> Result<(), ShapeError> {
     }
 }
 
+/// The same for one that may be 0.
 fn not_negative(field: &'static str, value: f32) -> Result<(), ShapeError> {
     if value.is_finite() && (0.0..LARGEST).contains(&value) {
         Ok(())

@@ -93,6 +93,7 @@ impl ReducedRecord {
         Ok(())
     }
 
+    /// Rest: no amplitudes.
     pub(super) fn clear(&mut self) {
         for values in [
             &mut self.b,

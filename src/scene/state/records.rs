@@ -17,6 +17,7 @@ pub enum Records {
     Reduced(Box<[ReducedRecord; 2]>),
 }
 
+/// Latent states of a network are none of a reduced model, and the reverse.
 fn other_kind() -> Error {
     Error::Snapshot("belongs to a model of another kind".into())
 }

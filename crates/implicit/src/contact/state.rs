@@ -13,12 +13,14 @@ pub struct State<'a> {
     pub start: &'a [f32],
 }
 
+/// A node's row of a field `[K,3]`.
 pub fn vector(field: &[f32], node: u32) -> Vector {
     let at = 3 * node as usize;
     Vector::new(field[at], field[at + 1], field[at + 2])
 }
 
 impl State<'_> {
+    /// Where a node is, mm; at rest where `u` is empty.
     pub fn position(&self, node: u32) -> Vector {
         self.place(self.u, node)
     }
@@ -28,6 +30,7 @@ impl State<'_> {
         self.place(self.start, node)
     }
 
+    /// Where a node is under the displacements `u`, mm.
     fn place(&self, u: &[f32], node: u32) -> Vector {
         match u.is_empty() {
             true => vector(self.rest, node),

@@ -79,6 +79,7 @@ impl RowNodes {
         self.count += 1;
     }
 
+    /// Nodes and weights, up to six.
     pub fn entries(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
         self.entries[..self.count].iter().copied()
     }

@@ -65,11 +65,14 @@ impl ImplicitSolver {
         result.map(|()| report)
     }
 
+    /// Whether nothing moved in the last two steps: to the bit, for what moves by the least goes on moving.
     fn rests(&self) -> bool {
         let fields = [&self.motion.velocity, &self.motion.velocity_before];
         fields.iter().all(|field| field.iter().all(|v| *v == 0.0))
     }
 
+    /// BDF2 about the free swing of the natural modes: the modes' error under BDF2 is taken off before the iterations, which then have the rest of the field and the
+    /// law's nonlinearity to balance.
     fn swing_from(
         &mut self,
         context: SolverContext<'_>,

@@ -102,6 +102,7 @@ impl<'a> SolverContext<'a> {
         groups.filter_map(move |(at, group)| (let_go >> at & 1 != 0).then_some(group))
     }
 
+    /// What products with fields need of it.
     pub(super) fn env(&self) -> Env<'a> {
         Env {
             isa: self.isa,

@@ -21,6 +21,7 @@ struct Differences {
 }
 
 impl Differences {
+    /// Of a step of this length; a step from a host's displacement (`still`) knows no velocity.
     fn new(step_s: f64, input: &Input<'_>) -> Differences {
         Differences {
             half: (0.5 / step_s) as f32,

@@ -36,6 +36,7 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// No velocity and no inertia, of a body of `len` degrees of freedom.
     pub(super) fn at_rest(len: usize) -> Result<Motion> {
         Ok(Motion {
             velocity: memory::zeros(len, "velocities")?,
@@ -118,6 +119,7 @@ impl Motion {
         Ok(())
     }
 
+    /// Back to rest; the room stays.
     pub(super) fn clear(&mut self) {
         self.velocity.fill(0.0);
         self.velocity_before.fill(0.0);

@@ -44,6 +44,7 @@ pub(super) struct Oscillator {
 }
 
 impl Oscillators {
+    /// Makes the oscillators at the first free step, of the natural modes that a step of this length resolves.
     pub(super) fn ready(&mut self, context: SolverContext<'_>) -> Result<()> {
         if !self.faster.is_empty() {
             return Ok(());

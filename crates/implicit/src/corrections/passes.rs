@@ -39,15 +39,18 @@ pub(super) struct Sums<'a> {
 }
 
 impl<'a> Sums<'a> {
+    /// Room for `count` sums of each piece of a field of `len`.
     pub(super) fn new(partial: &'a mut PartialSums, len: usize, count: usize) -> Sums<'a> {
         partial.resize(len.div_ceil(PIECE) * count);
         Sums { partial, count }
     }
 
+    /// The pieces' sums, each written by the thread that has the piece.
     pub(super) fn parts(&mut self) -> Parts<f32> {
         Parts::new(self.partial.values())
     }
 
+    /// One of the sums over all pieces, added in their order.
     pub(super) fn total(&mut self, at: usize) -> f64 {
         let own = self.partial.values().iter().skip(at).step_by(self.count);
         own.map(|&sum| f64::from(sum)).sum()

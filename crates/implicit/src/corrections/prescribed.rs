@@ -173,6 +173,7 @@ impl ImplicitSolver {
         Ok(det)
     }
 
+    /// A guess that has the contact where the host asks for it, and the iterations about it; on return `g` is the residual of `u`.
     fn iterate(
         &mut self,
         context: SolverContext<'_>,

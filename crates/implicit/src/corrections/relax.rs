@@ -86,6 +86,7 @@ impl ImplicitSolver {
         made
     }
 
+    /// One iteration, its fields lent: the line search tries `u + t d` in `q`, with its residual in `g_new`; `u` and `g` change only where a state is accepted.
     fn improve_in(
         &mut self,
         context: SolverContext<'_>,

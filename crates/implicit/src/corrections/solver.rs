@@ -115,6 +115,7 @@ impl ImplicitSolver {
         }
     }
 
+    /// The pairs of the state being made become those of the published one, to which a refused step goes back.
     fn commit_pairs(&mut self) {
         self.memory.commit();
         if let Some(local) = &mut self.local {

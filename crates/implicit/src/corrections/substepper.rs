@@ -188,6 +188,7 @@ impl ImplicitSolver {
         Ok(report)
     }
 
+    /// The parts of a free step one after the other, each from the end of the one before.
     fn swing_each(
         &mut self,
         context: SolverContext<'_>,

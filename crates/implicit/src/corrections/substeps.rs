@@ -99,6 +99,8 @@ impl ImplicitSolver {
         Ok(whole.and(&parts))
     }
 
+    /// The step in parts: the solver and the contact change over to the shorter step's coefficients, make the parts, and change back.
+    /// What the host sees of it is one step: the pasts of before it come back, and the last part's end is the step's.
     fn drive_substeps(
         &mut self,
         context: SolverContext<'_>,
@@ -135,6 +137,7 @@ impl ImplicitSolver {
         Ok(report)
     }
 
+    /// The parts one after the other: tools and ties at their places of the way, the loads of the part, and the forces that the part before ended with.
     fn each_substep(
         &mut self,
         context: SolverContext<'_>,

@@ -124,6 +124,7 @@ impl ToolStep<'_> {
         result
     }
 
+    /// Guess, iterations, and what takes their place where they lost the contact or inverted elements; on return `at` is the state of the step.
     fn iterate_loaded(&mut self, at: &mut Iterate<'_>) -> Result<()> {
         let _span = tracing::trace_span!("guess").entered();
         self.guess_loaded(at)?;
@@ -332,6 +333,7 @@ fn is_sound(unbalanced: f64, min_det: f32) -> bool {
     unbalanced.is_finite() && min_det >= SMALLEST_DET
 }
 
+/// `A_k` of the body at rest: the bundle's columns less what inertia holds back in a step of this length.
 fn compliance<'a>(
     context: SolverContext<'a>,
     preconditioner: &'a Preconditioner,

@@ -109,6 +109,7 @@ impl WholeModes {
         Ok(cut)
     }
 
+    /// How many whole modes there are.
     pub(super) fn count(&self) -> usize {
         self.own[0].len().isqrt()
     }

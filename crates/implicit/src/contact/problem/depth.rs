@@ -83,6 +83,7 @@ impl Depths<'_> {
         inside.chain(pushed).chain(buried).fold(0.0, f32::max)
     }
 
+    /// What rows are measured by, while the search keeps what it has found.
     fn gauge(&self) -> Gauge<'_> {
         Gauge {
             samples: &self.surface.samples,

@@ -27,6 +27,7 @@ impl ContactProblem {
         self.prescribed.sorted()
     }
 
+    /// Nodes of the samples that push, without held ones, in no order and perhaps twice.
     fn gather_touched(&mut self, held: &[bool]) {
         let nodes = &mut self.prescribed.nodes;
         nodes.clear();
@@ -48,6 +49,7 @@ impl ContactProblem {
         self.each_nodal_force(&self.past.forces, take);
     }
 
+    /// `B^T f`: each row's force, mN, by the weights of its nodes; a node that several rows have is called several times.
     fn each_nodal_force(&self, forces: &[Force], mut take: impl FnMut(u32, Vector)) {
         let points = self.tied.points(&self.surface.samples);
         for force in forces {

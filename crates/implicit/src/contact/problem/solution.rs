@@ -53,6 +53,7 @@ pub enum Time {
 }
 
 impl Time {
+    /// When the sweeps of one linearisation end.
     pub fn limits(self) -> Limits {
         match self {
             Self::StepEnd => Limits {

@@ -48,6 +48,7 @@ impl ContactProblem {
         self.solve_at(compliance, state, part, Time::StepEnd)
     }
 
+    /// See [`ContactProblem::solve`]: rows, `W` and `g`, sweeps, forces, and what of them is new. Until the forces are written nothing has changed but scratch.
     fn solve_at(
         &mut self,
         compliance: Compliance<'_>,

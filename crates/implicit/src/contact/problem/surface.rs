@@ -25,6 +25,8 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
     pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>) -> Result<Surface> {
         Ok(Surface {
             search: memory::tried(Search::with_room(&samples), WHAT)?,

@@ -96,6 +96,7 @@ impl TieSet {
         }
     }
 
+    /// What the law of a tie is asked with: where its far end is at a part of the step depends on the tools and on what is broken.
     pub(super) fn pulling<'a>(&'a self, ways: &'a ToolWays, next: &'a Past) -> Pulling<'a> {
         Pulling {
             ties: &self.list,

@@ -91,6 +91,7 @@ impl Tangent for Response<'_> {
 }
 
 impl NearColumns {
+    /// Forgets all columns: another factor has others.
     fn clear(&mut self) {
         self.columns.clear();
         self.moved.clear();

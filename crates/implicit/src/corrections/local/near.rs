@@ -78,6 +78,7 @@ pub(in crate::corrections) struct NearSet {
 }
 
 impl NearSet {
+    /// Nothing is near yet; lists by node and by chunk have their sizes for good.
     pub fn new(env: Env<'_>) -> Result<NearSet> {
         let (count, chunks) = (env.body.mass.len(), env.body.forces.chunk_count());
         Ok(NearSet {

@@ -145,6 +145,8 @@ pub(in crate::corrections) struct Spare {
 }
 
 impl Spare {
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
     pub fn new(env: Env<'_>) -> Result<Spare> {
         let count = env.space.count();
         let modes = || memory::zeros(count, WHAT);

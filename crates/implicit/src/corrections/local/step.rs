@@ -23,6 +23,7 @@ pub(in crate::corrections) struct Change {
 }
 
 impl Step {
+    /// No step, of `count` modes; its places come with a near set.
     pub fn with_modes(count: usize) -> Result<Step> {
         Ok(Step {
             t: Vec::new(),
@@ -51,6 +52,7 @@ impl Step {
 }
 
 impl Change {
+    /// No change, likewise.
     pub fn with_modes(count: usize) -> Result<Change> {
         Ok(Change {
             r: Vec::new(),

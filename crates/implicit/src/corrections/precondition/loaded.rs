@@ -10,6 +10,7 @@ use crate::kernels::rows::decode_rows;
 use crate::memory;
 
 impl<'a> Env<'a> {
+    /// Instruction set and threads alone.
     pub(super) fn compute(self) -> Compute<'a> {
         Compute {
             isa: self.isa,
