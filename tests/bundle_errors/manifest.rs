@@ -43,6 +43,18 @@ fn manifest_errors_name_the_field() {
         (
             "tiny-upt",
             "/material/law",
+            serde_json::json!({"name": "yeoh", "c2_over_c1": -0.5, "c3_over_c1": 0}),
+            "material.law.c2_over_c1",
+        ),
+        (
+            "tiny-upt",
+            "/material/law",
+            serde_json::json!({"name": "veronda-westmann", "beta": 0.1}),
+            "material.law.beta",
+        ),
+        (
+            "tiny-upt",
+            "/material/law",
             serde_json::json!({"name": "ogden"}),
             "terms",
         ),

@@ -69,7 +69,17 @@ const KEYS: &[(&str, &[&str])] = &[
             "relaxation",
         ],
     ),
-    ("material.law", &["name", "c01_share", "terms"]),
+    (
+        "material.law",
+        &[
+            "name",
+            "c01_share",
+            "terms",
+            "c2_over_c1",
+            "c3_over_c1",
+            "beta",
+        ],
+    ),
     ("mesh", &["file", "nodes", "mesh_sha256"]),
     (
         "envelope",

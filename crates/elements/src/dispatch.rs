@@ -51,6 +51,10 @@ unsafe fn all_forces<L: Eigenvalues, const AVERAGED: bool>(
                 forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
             }
             Law::Ogden(_) => forces_by_stretches::<L, AVERAGED>(partition, chunk, nodes, forces),
+            Law::Yeoh(law) => forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces),
+            Law::VerondaWestmann(law) => {
+                forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
+            }
         }
     }
 }

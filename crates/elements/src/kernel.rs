@@ -28,6 +28,7 @@
 
 mod forces;
 mod gradients;
+mod grown;
 mod moduli;
 mod relax;
 mod shape;
@@ -50,6 +51,8 @@ pub fn flops(nodes: usize, tets: usize, law: &Law) -> usize {
         Law::NeoHookean(law) => flops_of(*law, nodes, tets),
         Law::MooneyRivlin(law) => flops_of(*law, nodes, tets),
         Law::Ogden(law) => flops_of_stretches(law.terms.len(), nodes, tets),
+        Law::Yeoh(law) => flops_of(*law, nodes, tets),
+        Law::VerondaWestmann(law) => flops_of(*law, nodes, tets),
     }
 }
 

@@ -48,6 +48,7 @@ pub use kernel::flops;
 pub use lanes::{Isa, WIDTH};
 pub use laws::{
     Invariants, Isochoric, Law, MOST_TERMS, MooneyRivlin, NeoHookean, Ogden, Term, Terms,
+    VerondaWestmann, Yeoh,
 };
 pub use material::{Material, Moduli};
 pub use partition::{Chunk, Partition};

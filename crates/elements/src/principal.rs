@@ -86,10 +86,19 @@ const ENTRIES: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]
 /// Where row `i`, column `j` is in [`Symmetric`].
 pub const PLACE: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
+/// `J^(-2/3) I1 - 3`, without cancellation.
+pub fn first_invariant(f: &[[f64; 3]; 3]) -> f64 {
+    3.0 * libm::expm1(-Shape::new(f).log / 3.0)
+}
+
 /// How much steeper the steepest principal stress rises than at rest, there 1.
 pub fn stiffening(law: &Stretches, f: &[[f64; 3]; 3]) -> f64 {
     let shape = Shape::new(f);
-    let rises = shape.eigenvalues().map(|d| law.rise(shape.logarithm(d)));
+    let logarithms = shape.eigenvalues().map(|d| shape.logarithm(d));
+    let squares = logarithms.map(|s| libm::exp(2.0 * s));
+    let mean = squares.iter().sum::<f64>() / 3.0;
+    let grown = |square: f64| 2.0 * law.slope * square * (square - mean);
+    let rises = [0, 1, 2].map(|k| law.rise(logarithms[k]) + grown(squares[k]));
     0.5 * rises.into_iter().fold(0.0, f64::max)
 }
 

@@ -1,6 +1,6 @@
 //! The tangent of the stress, `dP/dF`, of every law, and the stiffness of an element in its present shape, in f64.
 //!
-//! All laws are functions of the principal stretches, neo-Hookean and Mooney-Rivlin of exponents 2 and -2. With `P = cof F (T/J + p)`,
+//! All laws are functions of the principal stretches, those by invariants of exponents 2 and -2. With `P = cof F (T/J + p)`,
 //! `p = kappa (J - 1)`: `dP = dcof (T/J + p) + cof F (dT/J - T dJ/J² + kappa dJ)`. In the eigenvectors of `C` the
 //! diagonal of `dT` follows the principal stresses `f(s)`, `s = ln lambda - ln J / 3`, and its other entries are
 //! `(f_i - f_j) / (l_i - l_j) dC_ij` with the eigenvalues `l` of `C`.
@@ -25,13 +25,14 @@ pub fn tangent(state: &Deformation, moduli: Moduli) -> [[f64; 9]; 9] {
 
 /// The same with a part of what the pressure adds by the change of `cof F`.
 fn tangent_with(state: &Deformation, moduli: Moduli, turning: f64) -> [[f64; 9]; 9] {
-    let law = moduli.law.stretches();
     let f = &state.f;
     let c = [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| f[k][i] * f[k][j]).sum::<f64>()));
     let (values, vectors) = spectrum(c);
     let values = values.map(|l| l.max(LEAST));
     let log_det = values.map(libm::log).iter().sum::<f64>() / 2.0;
     let logarithm = |l: f64| 0.5 * libm::log(l) - log_det / 3.0;
+    let squares = values.map(|l| l * libm::exp(-2.0 / 3.0 * log_det));
+    let law = moduli.law.stretches(squares.iter().sum::<f64>() - 3.0);
     let pulls = values.map(|l| moduli.shear_pa * law.pull(logarithm(l)));
     let rises = values.map(|l| moduli.shear_pa * law.rise(logarithm(l)));
     let mut slopes = [[0.0; 3]; 3];
@@ -72,7 +73,10 @@ fn tangent_with(state: &Deformation, moduli: Moduli, turning: f64) -> [[f64; 9];
         let dc = |i: usize, j: usize| along[i] * vectors[l][j] + along[j] * vectors[l][i];
         let stretch = [0, 1, 2].map(|i| dc(i, i) / (2.0 * values[i]));
         let growth = stretch.iter().sum::<f64>() / 3.0;
-        let own = [0, 1, 2].map(|i| rises[i] * (stretch[i] - growth));
+        // How the whole of the term of exponent 2 changes with `I1`.
+        let first = (0..3).map(|i| 2.0 * squares[i] * (stretch[i] - growth));
+        let grown = moduli.shear_pa * law.slope * first.sum::<f64>();
+        let own = [0, 1, 2].map(|i| rises[i] * (stretch[i] - growth) + grown * squares[i]);
         let own_mean = own.iter().sum::<f64>() / 3.0;
         let d_deviator = from_principal(&vectors, |i, j| {
             if i == j {

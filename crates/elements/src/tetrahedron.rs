@@ -126,12 +126,14 @@ pub fn stress(state: &Deformation, moduli: Moduli) -> [[f64; 3]; 3] {
         Law::NeoHookean(law) => stress_by_invariants(law, state, moduli),
         Law::MooneyRivlin(law) => stress_by_invariants(law, state, moduli),
         Law::Ogden(_) => stress_by_stretches(state, moduli),
+        Law::Yeoh(law) => stress_by_invariants(law, state, moduli),
+        Law::VerondaWestmann(law) => stress_by_invariants(law, state, moduli),
     }
 }
 
 /// `P = cof F (T / J + kappa (J - 1))`.
 fn stress_by_stretches(state: &Deformation, moduli: Moduli) -> [[f64; 3]; 3] {
-    let deviator = principal::deviator(&moduli.law.stretches(), &state.f);
+    let deviator = principal::deviator(&moduli.law.stretches(0.0), &state.f);
     let scale = moduli.shear_pa / state.det.abs().max(LEAST_DET).copysign(state.det);
     let mut inner = deviator.map(|t| t * scale);
     for k in [0, 3, 5] {
@@ -177,16 +179,22 @@ pub fn shape_energy(state: &Deformation, law: Law, det: f64) -> f64 {
     match law {
         Law::NeoHookean(law) => law.energy(state.invariants(det)),
         Law::MooneyRivlin(law) => law.energy(state.invariants(det)),
-        Law::Ogden(_) => principal::energy(&law.stretches(), &state.f),
+        Law::Ogden(_) => principal::energy(&law.stretches(0.0), &state.f),
+        Law::Yeoh(law) => law.energy(state.invariants(det)),
+        Law::VerondaWestmann(law) => law.energy(state.invariants(det)),
     }
 }
 
 /// How much stiffer than at rest a law is against a change of the shape that a body has: of neo-Hookean and Mooney-Rivlin tissue 1, as an
-/// estimate; of Ogden's the steepest rise of a principal stress with the logarithm of its stretch, over that at rest.
+/// estimate; of the others the steepest rise of a principal stress with the logarithm of its stretch, over that at rest.
 pub fn stiffening(state: &Deformation, law: Law) -> f64 {
     match law {
         Law::NeoHookean(_) | Law::MooneyRivlin(_) => 1.0,
-        Law::Ogden(_) => principal::stiffening(&law.stretches(), &state.f),
+        Law::Ogden(_) => principal::stiffening(&law.stretches(0.0), &state.f),
+        Law::Yeoh(_) | Law::VerondaWestmann(_) => {
+            let x = principal::first_invariant(&state.f);
+            principal::stiffening(&law.stretches(x), &state.f)
+        }
     }
 }
 

@@ -6,7 +6,9 @@
 )]
 
 use elements::vector::{cross, dot};
-use elements::{Deformation, Law, Material, Moduli, MooneyRivlin, energy_density, stress};
+use elements::{
+    Deformation, Law, Material, Moduli, MooneyRivlin, VerondaWestmann, Yeoh, energy_density, stress,
+};
 
 type Matrix = [[f64; 3]; 3];
 
@@ -22,6 +24,24 @@ fn laws() -> Vec<Moduli> {
         .moduli()
     })
     .collect()
+}
+
+/// Those that stiffen: within what the exponential is, and beyond its cap.
+fn growing() -> Vec<Moduli> {
+    let yeoh = Yeoh {
+        c2_over_c1: 1.5,
+        c3_over_c1: 0.4,
+    };
+    let exponential = |beta| Law::VerondaWestmann(VerondaWestmann { beta });
+    let all = [Law::Yeoh(yeoh), exponential(2.0), exponential(9.0)];
+    all.map(|law| {
+        Material {
+            law,
+            ..Material::default()
+        }
+        .moduli()
+    })
+    .into()
 }
 
 fn state(f: Matrix) -> Deformation {
@@ -58,7 +78,7 @@ fn near(got: f64, want: f64, scale: f64) {
 #[test]
 fn stress_is_the_derivative_of_the_energy() {
     let f = [[1.3, 0.2, -0.1], [-0.15, 0.8, 0.25], [0.05, -0.3, 1.1]];
-    for moduli in laws() {
+    for moduli in laws().into_iter().chain(growing()) {
         let p = stress(&state(f), moduli);
         for i in 0..3 {
             for j in 0..3 {
@@ -82,7 +102,7 @@ fn stress_is_the_derivative_of_the_energy() {
 fn at_rest_every_law_is_linear_elasticity() {
     let gradient = [[0.3, -0.2, 0.5], [0.1, 0.4, -0.6], [0.7, 0.2, -0.1]];
     let trace = gradient[0][0] + gradient[1][1] + gradient[2][2];
-    for moduli in laws() {
+    for moduli in laws().into_iter().chain(growing()) {
         assert!(
             stress(&state(identity()), moduli)
                 .as_flattened()
@@ -136,6 +156,35 @@ fn uniaxial_stretch() {
     }
 }
 
+/// The same with `2 dW/dI1 = mu a h(x)` and `2 dW/dI2 = mu b`: `sigma_1 - sigma_2 = mu (l² - 1/l) (a h + b / l)`.
+#[test]
+fn uniaxial_stretch_of_laws_that_stiffen() {
+    for moduli in growing() {
+        for l in [0.6, 0.9, 1.1, 1.6f64] {
+            let across = l.powf(-0.5);
+            let sigma = cauchy(
+                [[l, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, across]],
+                moduli,
+            );
+            let x = l * l + 2.0 / l - 3.0;
+            let (first, second) = match moduli.law {
+                Law::Yeoh(law) => (
+                    1.0 + x * (2.0 * law.c2_over_c1 + 3.0 * x * law.c3_over_c1),
+                    0.0,
+                ),
+                Law::VerondaWestmann(law) => {
+                    let y = law.beta * x;
+                    let slope = y.min(3.0).exp() * (1.0 + (y - 3.0).max(0.0));
+                    (2.0 * slope, -1.0)
+                }
+                _ => unreachable!(),
+            };
+            let want = moduli.shear_pa * (l * l - 1.0 / l) * (first + second / l);
+            near(sigma[0][0] - sigma[1][1], want, 10.0 * moduli.bulk_pa);
+        }
+    }
+}
+
 /// `sigma_12 = 2 (C10 + C01) g`, `sigma_11 - sigma_33 = 2 C10 g²`, `sigma_22 - sigma_33 = -2 C01 g²`.
 #[test]
 fn simple_shear() {
@@ -172,7 +221,8 @@ fn dilation() {
 
 #[test]
 fn a_law_is_named_by_text_and_by_json() {
-    for law in laws().into_iter().map(|moduli| moduli.law) {
+    let all = laws().into_iter().chain(growing());
+    for law in all.map(|moduli| moduli.law) {
         assert_eq!(law.to_string().parse::<Law>().unwrap(), law);
     }
     for (text, word) in [
@@ -181,6 +231,14 @@ fn a_law_is_named_by_text_and_by_json() {
         ("mooney-rivlin:1.5", "law.c01_share"),
         ("mooney-rivlin:NaN", "law.c01_share"),
         ("neo-hookean:1", "unknown"),
+        ("yeoh", "unknown"),
+        ("yeoh:1,x", "`x` is not a number"),
+        ("yeoh:-0.1", "law.c2_over_c1"),
+        ("yeoh:-0.1", "not elliptic"),
+        ("yeoh:1,-0.1", "law.c3_over_c1"),
+        ("yeoh:1,1e9", "at most 1000"),
+        ("veronda-westmann:0.1", "law.beta"),
+        ("veronda-westmann:NaN", "law.beta"),
     ] {
         let error = text.parse::<Law>().unwrap_err();
         assert!(error.contains(word), "{error}");

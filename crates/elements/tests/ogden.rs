@@ -122,6 +122,9 @@ fn the_tangent_is_the_derivative_of_the_stress_for_every_law() {
     let others = [
         Law::default(),
         Law::MooneyRivlin(MooneyRivlin { c01_share: 0.3 }),
+        "yeoh:1.5,0.4".parse().unwrap(),
+        "veronda-westmann:0.5".parse().unwrap(),
+        "veronda-westmann:9".parse().unwrap(),
     ];
     for moduli in laws().chain(others.map(moduli)) {
         for f in shapes() {

@@ -2,7 +2,7 @@
 
 use elements::{
     Branch, ElementForces, Isa, Law, Material, MooneyRivlin, Ogden, Relaxation, StressStep,
-    Tetrahedron,
+    Tetrahedron, VerondaWestmann, Yeoh,
 };
 use tissue::mesh::{Mesh, box_phantom};
 
@@ -11,10 +11,15 @@ fn branches() -> Relaxation {
     Relaxation::parse("0.45,0.5,0.365,50,0.05,0.02").unwrap()
 }
 
-fn materials() -> [Material; 3] {
+fn materials() -> [Material; 5] {
     let ogden = Law::Ogden(Ogden::new(&[[-163.0, -18.0]]).unwrap());
     let mooney = Law::MooneyRivlin(MooneyRivlin { c01_share: 0.7 });
-    [Law::default(), mooney, ogden].map(|law| Material {
+    let yeoh = Law::Yeoh(Yeoh {
+        c2_over_c1: 1.5,
+        c3_over_c1: 0.4,
+    });
+    let exponential = Law::VerondaWestmann(VerondaWestmann { beta: 4.0 });
+    [Law::default(), mooney, ogden, yeoh, exponential].map(|law| Material {
         relaxation: branches(),
         ..Material::default().with_law(law)
     })

@@ -5,8 +5,9 @@
 //! functions. Any other exponent, and every lane in which a stretch comes near the cap, takes eigenvalues of `D` and divided
 //! differences. A lane's result does not depend on the others.
 
+use super::grown::grown;
 use super::moduli::inverse_cube_root;
-use crate::laws::{CAP, Law, MOST_TERMS};
+use crate::laws::{CAP, Grows, Law, MOST_TERMS};
 use lanes::NodeLanes;
 use lanes::functions::{exp_m1, ln_1p, third_of_angle};
 
@@ -31,12 +32,14 @@ pub struct LaneTerms {
     /// Whether they are.
     whole: bool,
     pub bulk_pa: f32,
+    /// How the first term grows with the shape; the second is then of exponent -2.
+    grows: Option<Grows>,
 }
 
 impl LaneTerms {
     /// Of a law with the material's moduli, Pa.
     pub fn new(law: &Law, [shear_pa, bulk_pa]: [f64; 2]) -> Self {
-        let stretches = law.stretches();
+        let stretches = law.stretches(0.0);
         let mut out = Self {
             mu: [0.0; MOST_TERMS],
             alpha: [0.0; MOST_TERMS],
@@ -44,6 +47,7 @@ impl LaneTerms {
             count: stretches.terms.len(),
             whole: true,
             bulk_pa: bulk_pa as f32,
+            grows: law.grows(),
         };
         for (at, term) in stretches.terms.iter().enumerate() {
             out.mu[at] = (shear_pa * term.mu_pa) as f32;
@@ -175,6 +179,10 @@ pub trait Eigenvalues: NodeLanes {
 #[inline(always)]
 pub unsafe fn deviator<L: Eigenvalues>(law: &LaneTerms, strain: &Strain<L>) -> [L; 6] {
     unsafe {
+        if let Some(grows) = law.grows {
+            let both = [&strain.d, &strain.square];
+            return grown(grows, [law.mu[0], law.mu[1]], both, [strain.j2, strain.x]);
+        }
         if !law.whole {
             return L::by_eigenvalues(law, strain);
         }

@@ -1,6 +1,6 @@
 //! What a law without change of volume is made of.
 
-use lanes::Lanes;
+use lanes::FunctionLanes;
 
 /// `I1`, `I2` and `J^(-1/3)`.
 #[derive(Clone, Copy, Debug)]
@@ -45,5 +45,5 @@ pub trait Isochoric: Copy {
     ///
     /// # Safety
     /// As for `Lanes`. No closures, see `kernel`.
-    unsafe fn lane_slopes<L: Lanes>(self, first: L, second: L, root: L) -> LaneSlopes<L>;
+    unsafe fn lane_slopes<L: FunctionLanes>(self, first: L, second: L, root: L) -> LaneSlopes<L>;
 }

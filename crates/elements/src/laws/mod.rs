@@ -11,24 +11,30 @@
 //!
 //! REQ-081: The stress of every law is the derivative of its energy, on every instruction set.
 
+mod growth;
 mod isochoric;
 mod mooney_rivlin;
 mod neo_hookean;
 mod ogden;
 mod stretches;
 mod terms;
+mod veronda_westmann;
+mod yeoh;
 
 use crate::fault::MaterialError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
+pub use growth::Growing;
 pub use isochoric::{Invariants, Isochoric, LaneSlopes, Slopes};
 pub use mooney_rivlin::MooneyRivlin;
 pub use neo_hookean::NeoHookean;
 pub use ogden::{CAP, Ogden};
 pub use stretches::Stretches;
 pub use terms::{MOST_TERMS, Term, Terms};
+pub use veronda_westmann::VerondaWestmann;
+pub use yeoh::Yeoh;
 
 /// The law of a material, as files name it: `{"name": "mooney-rivlin", "c01_share": 0.5}`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,10 +46,21 @@ pub enum Law {
     MooneyRivlin(MooneyRivlin),
     /// `w = sum mu_t / alpha_t (l1^alpha_t + l2^alpha_t + l3^alpha_t - 3) / G` with `l = J^(-1/3) lambda`.
     Ogden(Ogden),
+    /// `w = (x + C2/C1 x² + C3/C1 x³) / 2` with `x = J^(-2/3) I1 - 3`.
+    Yeoh(Yeoh),
+    /// `w = (exp(beta x) - 1) / beta - (J^(-4/3) I2 - 3) / 2`.
+    VerondaWestmann(VerondaWestmann),
+}
+
+/// A law whose part by `I1` grows with it.
+#[derive(Clone, Copy)]
+pub(crate) enum Grows {
+    Yeoh(Yeoh),
+    VerondaWestmann(VerondaWestmann),
 }
 
 /// The names that [`Law::from_str`] takes.
-const NAMES: &str = "neo-hookean, mooney-rivlin, mooney-rivlin:SHARE with a share of C01 from 0 to 1, or ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it";
+const NAMES: &str = "neo-hookean, mooney-rivlin, mooney-rivlin:SHARE with a share of C01 from 0 to 1, yeoh:C2/C1[,C3/C1] as numbers, veronda-westmann:BETA, or ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it";
 
 impl Default for Law {
     fn default() -> Self {
@@ -57,19 +74,42 @@ impl Law {
         *self == Self::default()
     }
 
-    /// The law in principal stretches: its terms over the shear modulus, and where their exponential ends.
-    pub(crate) fn stretches(&self) -> Stretches {
+    /// The law in principal stretches: its terms over the shear modulus, and where their exponential ends; of a law that grows with `I1` those at
+    /// `x = J^(-2/3) I1 - 3`.
+    pub(crate) fn stretches(&self, x: f64) -> Stretches {
         let terms = |terms: &[[f64; 2]]| Stretches {
             terms: Ogden::new(terms).unwrap_or_default().terms,
             cap: f64::INFINITY,
+            slope: 0.0,
         };
+        fn grown(law: impl Growing, x: f64) -> Stretches {
+            let ([first, second], [now, slope]) = (law.parts(), law.growth(x));
+            let terms = Ogden::new(&[[first * now, 2.0], [-second, -2.0]]);
+            Stretches {
+                terms: terms.unwrap_or_default().terms,
+                cap: f64::INFINITY,
+                slope: first * slope,
+            }
+        }
         match self {
             Self::NeoHookean(_) => terms(&[[1.0, 2.0]]),
             Self::MooneyRivlin(law) => terms(&[[1.0 - law.c01_share, 2.0], [-law.c01_share, -2.0]]),
             Self::Ogden(law) => Stretches {
                 terms: law.normalised(),
                 cap: CAP,
+                slope: 0.0,
             },
+            Self::Yeoh(law) => grown(*law, x),
+            Self::VerondaWestmann(law) => grown(*law, x),
+        }
+    }
+
+    /// How its part by `I1` grows.
+    pub(crate) fn grows(&self) -> Option<Grows> {
+        match self {
+            Self::NeoHookean(_) | Self::MooneyRivlin(_) | Self::Ogden(_) => None,
+            Self::Yeoh(law) => Some(Grows::Yeoh(*law)),
+            Self::VerondaWestmann(law) => Some(Grows::VerondaWestmann(*law)),
         }
     }
 
@@ -81,16 +121,16 @@ impl Law {
     /// Young's modulus where the law has a shear modulus of its own, Pa.
     pub fn young_pa(&self, poisson: f64) -> Option<f64> {
         match self {
-            Self::NeoHookean(_) | Self::MooneyRivlin(_) => None,
             Self::Ogden(law) => Some(2.0 * (1.0 + poisson) * law.shear_pa()),
+            _ => None,
         }
     }
 
     /// With a shear modulus of its own: `part` of it.
     pub(crate) fn times(self, part: f64) -> Self {
         match self {
-            Self::NeoHookean(_) | Self::MooneyRivlin(_) => self,
             Self::Ogden(law) => Self::Ogden(law.times(part)),
+            _ => self,
         }
     }
 
@@ -100,6 +140,8 @@ impl Law {
             Self::NeoHookean(_) => None,
             Self::MooneyRivlin(law) => law.fault(),
             Self::Ogden(law) => law.fault(),
+            Self::Yeoh(law) => law.fault(),
+            Self::VerondaWestmann(law) => law.fault(),
         }
     }
 }
@@ -113,6 +155,8 @@ impl fmt::Display for Law {
                 None => write!(f, "mooney-rivlin:{}", law.c01_share),
             },
             Self::Ogden(law) => law.fmt(f),
+            Self::Yeoh(law) => write!(f, "yeoh:{},{}", law.c2_over_c1, law.c3_over_c1),
+            Self::VerondaWestmann(law) => write!(f, "veronda-westmann:{}", law.beta),
         }
     }
 }
@@ -126,12 +170,25 @@ impl FromStr for Law {
             None => (text, None),
             Some((name, constant)) => (name, Some(constant)),
         };
+        let number = |constant: &str| {
+            let constant = constant.trim();
+            (constant.parse()).map_err(|_| format!("law `{text}`: `{constant}` is not a number"))
+        };
         let law = match (name, constant) {
             ("neo-hookean", None) => Self::default(),
             ("mooney-rivlin", None) => Self::MooneyRivlin(MooneyRivlin::default()),
             ("mooney-rivlin", Some(constant)) => Self::MooneyRivlin(MooneyRivlin {
-                c01_share: (constant.parse())
-                    .map_err(|_| format!("law `{text}`: `{constant}` is not a number"))?,
+                c01_share: number(constant)?,
+            }),
+            ("yeoh", Some(constants)) => {
+                let (second, third) = constants.split_once(',').unwrap_or((constants, "0"));
+                Self::Yeoh(Yeoh {
+                    c2_over_c1: number(second)?,
+                    c3_over_c1: number(third)?,
+                })
+            }
+            ("veronda-westmann", Some(constant)) => Self::VerondaWestmann(VerondaWestmann {
+                beta: number(constant)?,
             }),
             ("ogden", Some(constants)) => Self::Ogden(Ogden::parse(constants)?),
             _ => return Err(format!("law `{text}` is unknown: use {NAMES}")),

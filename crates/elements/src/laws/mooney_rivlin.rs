@@ -7,7 +7,7 @@
 
 use super::{Invariants, Isochoric, LaneSlopes, Slopes};
 use crate::fault::MaterialError;
-use lanes::Lanes;
+use lanes::FunctionLanes;
 use serde::{Deserialize, Serialize};
 
 /// The law's own constant.
@@ -59,7 +59,7 @@ impl Isochoric for MooneyRivlin {
     }
 
     #[inline(always)]
-    unsafe fn lane_slopes<L: Lanes>(self, first: L, second: L, root: L) -> LaneSlopes<L> {
+    unsafe fn lane_slopes<L: FunctionLanes>(self, first: L, second: L, root: L) -> LaneSlopes<L> {
         // SAFETY: the caller's.
         unsafe {
             let root2 = root.mul(root);

@@ -1,7 +1,7 @@
 //! Neo-Hookean: `w = (J^(-2/3) I1 - 3) / 2`. The fast path of the kernel: springs along the edges do not change but by a factor.
 
 use super::{Invariants, Isochoric, LaneSlopes, Slopes};
-use lanes::Lanes;
+use lanes::FunctionLanes;
 use serde::{Deserialize, Serialize};
 
 /// It has no constant of its own.
@@ -27,7 +27,7 @@ impl Isochoric for NeoHookean {
     }
 
     #[inline(always)]
-    unsafe fn lane_slopes<L: Lanes>(self, first: L, second: L, root: L) -> LaneSlopes<L> {
+    unsafe fn lane_slopes<L: FunctionLanes>(self, first: L, second: L, root: L) -> LaneSlopes<L> {
         // SAFETY: the caller's.
         unsafe {
             let root2 = root.mul(root);

@@ -70,6 +70,7 @@ impl Ogden {
         Stretches {
             terms: self.terms,
             cap: CAP,
+            slope: 0.0,
         }
         .pull(s)
     }

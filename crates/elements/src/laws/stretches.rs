@@ -9,6 +9,8 @@ use super::terms::Terms;
 pub struct Stretches {
     pub terms: Terms,
     pub cap: f64,
+    /// How the term of exponent 2 rises with `I1 = l1² + l2² + l3²`; 0 of a law whose terms do not change with the shape.
+    pub slope: f64,
 }
 
 impl Stretches {

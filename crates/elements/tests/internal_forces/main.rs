@@ -4,14 +4,22 @@ mod bodies;
 mod regions;
 
 use bodies::{body, exact, forces_on, mixed, ogden_laws, serial, wave};
-use elements::{CutTetrahedra, ElementForces, Isa, Law, Material, MooneyRivlin, Subset};
+use elements::{
+    CutTetrahedra, ElementForces, Isa, Law, Material, MooneyRivlin, Subset, VerondaWestmann, Yeoh,
+};
 use tissue::mesh::Mesh;
 
 /// Verifies REQ-081.
 #[test]
 fn they_are_those_of_the_law_on_every_instruction_set() {
     let law = Law::MooneyRivlin(MooneyRivlin { c01_share: 0.7 });
-    for law in [Law::default(), law] {
+    let yeoh = Yeoh {
+        c2_over_c1: 1.5,
+        c3_over_c1: 0.4,
+    };
+    // The cap is reached in some elements.
+    let exponential = Law::VerondaWestmann(VerondaWestmann { beta: 4.0 });
+    for law in [Law::default(), law, Law::Yeoh(yeoh), exponential] {
         check(&Material {
             law,
             ..Material::default()

@@ -21,7 +21,7 @@ pub(super) fn stiffest(gradients: &[[f64; 3]; 4], state: &Deformation, moduli: M
     }
     match moduli.law {
         Law::NeoHookean(_) | Law::MooneyRivlin(_) => bound,
-        Law::Ogden(_) => {
+        Law::Ogden(_) | Law::Yeoh(_) | Law::VerondaWestmann(_) => {
             let shear = 4.0 / 3.0 * moduli.shear_pa;
             let stiff = stiffening(state, moduli.law).max(1.0) / state.det.max(LEAST_DET);
             bound * (moduli.bulk_pa + shear * stiff) / (moduli.bulk_pa + shear)
