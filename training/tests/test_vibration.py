@@ -44,6 +44,16 @@ def test_eigenmodes_equal_a_dense_solver(mesh_path):
     assert np.abs(modes[:, np.setdiff1d(np.arange(3 * mesh.node_count), dofs)]).max() == 0.0
 
 
+def test_a_region_has_the_mass_of_its_density(mesh_path):
+    mesh = load_mesh(mesh_path)
+    plain = lumped_mass(mesh, 1000.0)
+    mesh.region = np.full(len(mesh.tets), 2, np.int32)
+    mesh.metadata["laws"] = '[{"name": "a"}, {"name": "b", "density_kg_m3": 1850}]'
+    assert np.allclose(lumped_mass(mesh, 1000.0), 1.85 * plain)
+    mesh.region[:] = 1
+    assert np.allclose(lumped_mass(mesh, 1000.0), plain)
+
+
 def test_modes_of_a_file_are_taken_and_those_of_another_body_refused(mesh_path, swings, tmp_path, capsys):
     mesh = load_mesh(mesh_path)
     frequency, modes = eigenmodes(mesh, "fixed", MATERIAL, 12)

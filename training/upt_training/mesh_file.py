@@ -49,6 +49,12 @@ class Mesh:
             digest.update(self.metadata.get("laws", "").encode())
         return digest.hexdigest()
 
+    def density(self, own: float) -> np.ndarray:
+        """Density of each tetrahedron, `[T]` kg/m³, in a body of density `own`: a region may have one of its own."""
+        laws = json.loads(self.metadata.get("laws", "[]"))
+        of_region = np.array([own, *(law.get("density_kg_m3") or own for law in laws)], np.float64)
+        return of_region[self.region] if len(self.region) else np.full(len(self.tets), of_region[0])
+
     @property
     def domain_nodes(self) -> np.ndarray:
         """Nodes of the domain's faces, ascending."""

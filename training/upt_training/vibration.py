@@ -52,11 +52,12 @@ def _gradients(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def lumped_mass(mesh: Mesh, density_kg_m3: float) -> np.ndarray:
-    """A quarter of each tetrahedron's mass at its corners, `[K]` kg."""
+    """A quarter of each tetrahedron's mass at its corners, `[K]` kg; a region may have a density of its own."""
     volume = _gradients(mesh)[1]
     out = np.zeros(mesh.node_count)
-    np.add.at(out, np.asarray(mesh.tets).ravel(), np.repeat(volume / 4.0, 4))
-    return 1e-9 * density_kg_m3 * out
+    mass = 1e-9 * volume * mesh.density(density_kg_m3)
+    np.add.at(out, np.asarray(mesh.tets).ravel(), np.repeat(mass / 4.0, 4))
+    return out
 
 
 def elimination_order(positions: np.ndarray, neighbours: sparse.csr_matrix) -> np.ndarray:

@@ -1,11 +1,13 @@
 //! `upt make`: a bundle from an organ's surface or mesh (`crates/make`).
 
+mod choice;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
-use elements::{Law, Region as LawRegion, Relaxation};
+use elements::{Law, Relaxation};
 use host::Effort;
 use make::{Choice, Fixed, Gravity, Made, gravity};
 use serde_json::json;
@@ -14,6 +16,7 @@ use tissue::mesh_import::Region;
 use tissue::programmes::ToolProgramme;
 
 use crate::{emit, loads, materials, progress, tool_size};
+use choice::choice;
 
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
@@ -86,9 +89,9 @@ pub struct Options {
     #[command(flatten)]
     sizes: tool_size::Arguments,
     /// Material that sets Young's modulus, density and damping: brain (if none is given), liver, kidney, heart or fat. With REGION= before it, a law as of
-    /// --law that a region has: one that --region or the mesh file names, or else a group of the input. May be repeated; where regions overlap, the
-    /// last one counts. All have the same Poisson's ratio, density, damping and relaxation.
-    #[arg(long, value_name = "NAME|REGION=LAW", allow_hyphen_values = true, value_parser = choice)]
+    /// --law that a region has, and with @ behind that its density, kg/m³: one that --region or the mesh file names, or else a group of the input. May be repeated; where
+    /// regions overlap, the last one counts. All have the same Poisson's ratio, damping and relaxation.
+    #[arg(long, value_name = "NAME|REGION=LAW[@DENSITY]", allow_hyphen_values = true, value_parser = choice)]
     material: Vec<Choice>,
     /// Region that --material gives a law: a name, `=` and a region as of --fixed. May be repeated; regions of one name are one.
     #[arg(long, value_name = "NAME=REGION", allow_hyphen_values = true)]
@@ -96,11 +99,12 @@ pub struct Options {
     /// Young's modulus, Pa; overrides the material's. A law with a modulus of its own sets it.
     #[arg(long)]
     young: Option<f64>,
-    /// Law of the tissue: neo-hookean, mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain), ogden:MU,ALPHA[,MU,ALPHA...] with
-    /// MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
+    /// Law of the tissue: neo-hookean, mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain), yeoh:C2/C1[,C3/C1] as
+    /// numbers, veronda-westmann:BETA, ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
     #[arg(long, default_value = "neo-hookean", value_parser = materials::law)]
     law: Law,
-    /// Relaxation of the stress without change of volume: SHARE,TAU_S[,SHARE,TAU_S...], each share lost with its time constant, s. Default: none.
+    /// Relaxation of the stress without change of volume: SHARE,TAU_S[,SHARE,TAU_S...], each share lost with its time constant, s, or a tissue that
+    /// `upt materials` lists with one. Default: none.
     #[arg(long, default_value = "", hide_default_value = true, value_parser = materials::relaxation)]
     relaxation: Relaxation,
     /// Poisson's ratio, below 0.5.
@@ -170,24 +174,6 @@ fn stiffer(text: &str) -> Result<(Region, f32), String> {
         Ok(factor) if factor.is_finite() && factor > 0.0 => Ok((region.parse()?, factor)),
         _ => Err(format!("`{factor}` is not a number above 0")),
     }
-}
-
-/// A value of `--material`.
-fn choice(text: &str) -> Result<Choice, String> {
-    let Some((name, law)) = text.split_once('=') else {
-        return Ok(Choice::Numbers(text.trim().to_owned()));
-    };
-    let name = name.trim().to_owned();
-    if name.is_empty() {
-        return Err(format!("`{text}` has no region before its equals sign"));
-    }
-    let own = materials::law(law.trim()).map_err(|error| format!("region `{name}`: {error}"))?;
-    let region = LawRegion {
-        source: materials::source_of(&own),
-        law: own,
-        name,
-    };
-    Ok(Choice::Law(region, law.trim().to_owned()))
 }
 
 impl Options {

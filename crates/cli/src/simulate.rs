@@ -110,11 +110,12 @@ pub struct SolverArguments {
     /// Young's modulus, Pa. Default: 3000, or that of the law where it has one of its own.
     #[arg(long)]
     young: Option<f64>,
-    /// Law of the tissue: neo-hookean, mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain), ogden:MU,ALPHA[,MU,ALPHA...] with
-    /// MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
+    /// Law of the tissue: neo-hookean, mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain), yeoh:C2/C1[,C3/C1] as
+    /// numbers, veronda-westmann:BETA, ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
     #[arg(long, default_value = "neo-hookean", value_parser = materials::law)]
     law: elements::Law,
-    /// Relaxation of the stress without change of volume: SHARE,TAU_S[,SHARE,TAU_S...], each share lost with its time constant, s. Default: none.
+    /// Relaxation of the stress without change of volume: SHARE,TAU_S[,SHARE,TAU_S...], each share lost with its time constant, s, or a tissue that
+    /// `upt materials` lists with one. Default: none.
     #[arg(long, default_value = "", hide_default_value = true, value_parser = materials::relaxation)]
     relaxation: elements::Relaxation,
     /// Poisson's ratio.

@@ -1,8 +1,8 @@
 //! Regions of a body that have a law of their own.
 //!
 //! A region's law gives the shape of the stress; how stiff it is against the rest of the body is the stiffness of its tetrahedra. So at rest a body of several
-//! laws is one of several stiffnesses, and modes, linear response and compliance know nothing of laws. Poisson's ratio, damping and relaxation are
-//! the body's.
+//! laws is one of several stiffnesses, and modes, linear response and compliance know nothing of laws. A region may have a density, too, which masses alone
+//! know. Poisson's ratio, damping and relaxation are the body's.
 
 use crate::fault::MaterialError;
 use crate::laws::Law;
@@ -11,6 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// Regions of a body at most.
 pub const MOST_REGIONS: usize = 64;
+/// Density of a region at most, kg/m³.
+const MOST_DENSITY: f64 = 1e5;
 /// Part by which the stiffness of a tetrahedron may differ from that of a law which has its own shear modulus.
 const SAME_MODULUS: f64 = 1e-3;
 
@@ -23,6 +25,9 @@ pub struct Region {
     /// Where its constants come from: a DOI, a test. Left out of files where nothing is known.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub source: String,
+    /// Density, kg/m³. Left out of files where it is the material's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density_kg_m3: Option<f64>,
 }
 
 impl Region {
@@ -65,6 +70,15 @@ impl Laws<'_> {
         }
     }
 
+    /// The density of a tetrahedron, kg/m³, in a body of the density `own`.
+    pub fn density_of(&self, tet: usize, own: f64) -> f64 {
+        let region = usize::from(self.number_of(tet)).checked_sub(1);
+        let region = region.and_then(|at| self.regions.get(at));
+        region
+            .and_then(|region| region.density_kg_m3)
+            .unwrap_or(own)
+    }
+
     /// Checks names and constants of the regions, and that every tetrahedron has a law.
     ///
     /// # Errors
@@ -83,6 +97,13 @@ impl Laws<'_> {
             if region.name.is_empty() || before.any(|other| other.name == region.name) {
                 let field = format!("region `{}`", region.name);
                 return fail(field, at, "a region with a name of its own".into());
+            }
+            let density = region.density_kg_m3;
+            if density.is_some_and(|own| !(own > 0.0 && own <= MOST_DENSITY)) {
+                let field = format!("region `{}`: density_kg_m3", region.name);
+                let wanted = "positive and at most 1e5 kg/m^3";
+                return MaterialError::some(field, density.unwrap_or(0.0), wanted)
+                    .map_or(Ok(()), Err);
             }
             if let Some(fault) = region.law.fault() {
                 return Err(MaterialError {

@@ -43,8 +43,12 @@ pub fn apply(
             true => String::new(),
             false => format!(", from {}", own.source),
         };
+        let density = match own.density_kg_m3 {
+            None => String::new(),
+            Some(density) => format!(" and {density} kg/m³"),
+        };
         stage.decided(&format!(
-            "{} tetrahedra of region `{}` have the law {}{source}",
+            "{} tetrahedra of region `{}` have the law {}{source}{density}",
             rows.len(),
             own.name,
             own.law

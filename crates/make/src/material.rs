@@ -17,7 +17,13 @@ impl fmt::Display for Choice {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Numbers(name) => to.write_str(name),
-            Self::Law(region, law) => write!(to, "{}={law}", region.name),
+            Self::Law(region, law) => {
+                write!(to, "{}={law}", region.name)?;
+                match region.density_kg_m3 {
+                    None => Ok(()),
+                    Some(density) => write!(to, "@{density}"),
+                }
+            }
         }
     }
 }

@@ -75,8 +75,9 @@ impl Modes {
     /// `phi_max M phi` `[m,3K]`: its product with a field is the amplitude of the mode in it.
     pub fn weighted(&self, mesh: &Mesh, density_kg_m3: f64) -> Vec<f32> {
         let mut mass = vec![0.0; mesh.node_count()];
-        for tet in &mesh.tets {
-            let share = 0.25e-9 * density_kg_m3 * tet_volume(&mesh.positions, *tet);
+        for (at, tet) in mesh.tets.iter().enumerate() {
+            let density = mesh.laws().density_of(at, density_kg_m3);
+            let share = 0.25e-9 * density * tet_volume(&mesh.positions, *tet);
             tet.iter().for_each(|&node| mass[node as usize] += share);
         }
         let (_, largest) = self.scaled();

@@ -24,6 +24,7 @@ pub fn blocks(laws: &[Law]) -> Mesh {
             name: at.to_string(),
             law,
             source: String::new(),
+            density_kg_m3: None,
         })
         .collect();
     mesh

@@ -32,6 +32,23 @@ fn bodies_of_several_laws_have_the_forces_of_each() {
 }
 
 #[test]
+fn a_region_has_a_density_of_its_own() {
+    let mut mesh = mixed();
+    mesh.regions[1].density_kg_m3 = Some(1850.0);
+    let of = |number: u8| {
+        let at = mesh.region.iter().position(|own| *own == number).unwrap();
+        mesh.laws().density_of(at, 1000.0)
+    };
+    assert_eq!([0, 1, 2, 3].map(of), [1000.0, 1000.0, 1850.0, 1000.0]);
+    assert_eq!(body().laws().density_of(0, 990.0), 990.0);
+    for density in [0.0, -1.0, f64::NAN, 1e6] {
+        mesh.regions[1].density_kg_m3 = Some(density);
+        let error = mesh.laws().check(mesh.tets.len()).unwrap_err().to_string();
+        assert!(error.contains("region `1`: density_kg_m3"), "{error}");
+    }
+}
+
+#[test]
 fn faults_of_regions_name_the_region() {
     let material = Material::default();
     let check = |change: &dyn Fn(&mut Mesh)| {

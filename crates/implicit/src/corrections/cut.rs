@@ -102,6 +102,8 @@ impl Corrections {
         let own = mesh.stiffness.get(element as usize).copied().unwrap_or(1.0);
         let whole = Tetrahedron::new(corners, rest, 1.0);
         let mut lost = Tetrahedron::new(corners, rest, f64::from(own));
+        let laws = mesh.tetrahedra().laws;
+        let density = 1e-6 * laws.density_of(element as usize, material.density_kg_m3);
         let moduli = material.moduli();
         lost.volume *= 1.0 - stiff;
         Some(Lost {
@@ -111,7 +113,7 @@ impl Corrections {
             volume: lost.volume,
             gradients: lost.gradients,
             stiffness: lost.steady_stiffness(&lost.deformation([[0.0; 3]; 4]), moduli),
-            mass: 0.25 * whole.volume * (1.0 - share) * material.density_g_mm3(),
+            mass: 0.25 * whole.volume * (1.0 - share) * density,
         })
     }
 
@@ -162,11 +164,13 @@ impl Corrections {
         around.sort_unstable();
         around.dedup();
         let moduli = material.moduli();
+        let laws = intact.tetrahedra().laws;
         let mut add = |corners: [u32; 4], parent: u32, (stiffness, share): (f32, f64)| {
             let rest = (body.mesh().tet(parent)).map(|node| intact.position(node).map(f64::from));
             let tet = Tetrahedron::new(corners, rest, f64::from(stiffness));
             let volume = tet.volume / f64::from(stiffness) * share;
-            let mass = 0.25 * volume * material.density_g_mm3();
+            let density = 1e-6 * laws.density_of(parent as usize, material.density_kg_m3);
+            let mass = 0.25 * volume * density;
             for (node, block) in corners.into_iter().zip(tet.diagonal_blocks(moduli)) {
                 if touched.binary_search(&node).is_err() {
                     continue;

@@ -76,7 +76,8 @@ impl Diagonal {
             let rest = corners.map(|node| positions[node as usize].map(f64::from));
             let stiffness = f64::from(body.stiffness_of(at));
             let tet = Tetrahedron::new(corners, rest, stiffness);
-            let share = 0.25 * tet.volume / stiffness * material.density_g_mm3();
+            let density = 1e-6 * body.laws.density_of(at, material.density_kg_m3);
+            let share = 0.25 * tet.volume / stiffness * density;
             for (node, block) in corners.into_iter().zip(tet.diagonal_blocks(moduli)) {
                 mass[node as usize] += share;
                 for (sum, value) in blocks[node as usize].iter_mut().zip(block) {

@@ -45,8 +45,9 @@ impl<'a> Space<'a> {
         density_kg_m3: f64,
     ) -> Self {
         let mut mass = vec![0.0; mesh.node_count()];
-        for tet in &mesh.tets {
-            let share = 0.25e-6 * density_kg_m3 * tet_volume(&mesh.positions, *tet);
+        for (at, tet) in mesh.tets.iter().enumerate() {
+            let density = mesh.laws().density_of(at, density_kg_m3);
+            let share = 0.25e-6 * density * tet_volume(&mesh.positions, *tet);
             for &node in tet {
                 mass[node as usize] += share;
             }

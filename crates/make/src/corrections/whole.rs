@@ -32,8 +32,9 @@ pub fn write(source: &Source<'_>, path: &Path) -> Result<usize> {
     let free = &source.stiffness.free.nodes;
     let (len, nodes) = (3 * free.len(), source.mesh.node_count());
     let mut mass = vec![0.0; nodes];
-    for tet in &source.mesh.tets {
-        let share = 0.25e-6 * source.density_kg_m3 * tet_volume(&source.mesh.positions, *tet);
+    for (at, tet) in source.mesh.tets.iter().enumerate() {
+        let density = source.mesh.laws().density_of(at, source.density_kg_m3);
+        let share = 0.25e-6 * density * tet_volume(&source.mesh.positions, *tet);
         tet.iter().for_each(|&node| mass[node as usize] += share);
     }
     let mass: Vec<f64> = (free.iter())

@@ -37,9 +37,10 @@ pub fn errors(
     let model = Model::open(bundle, &options)?;
     let forces = bench.element_forces()?;
     let mut mass = vec![0.0f32; bench.mesh.node_count()];
-    for tet in &bench.mesh.tets {
+    for (at, tet) in bench.mesh.tets.iter().enumerate() {
         let volume = tet_volume(&bench.mesh.positions, *tet);
-        let share = (0.25e-6 * bench.material.density_kg_m3 * volume) as f32;
+        let density = (bench.mesh.laws()).density_of(at, bench.material.density_kg_m3);
+        let share = (0.25e-6 * density * volume) as f32;
         tet.iter().for_each(|&node| mass[node as usize] += share);
     }
     let bar = watch.bar(pushes.len() as u64, "validation");

@@ -20,8 +20,9 @@ pub struct NaturalModes {
 /// Lumped mass of each node, kg: a quarter of each tetrahedron's at its corners.
 fn lumped_mass(mesh: &Mesh, density_kg_m3: f64) -> Vec<f64> {
     let mut mass = vec![0.0; mesh.node_count()];
-    for tet in &mesh.tets {
-        let share = 0.25e-9 * density_kg_m3 * tet_volume(&mesh.positions, *tet);
+    for (at, tet) in mesh.tets.iter().enumerate() {
+        let density = mesh.laws().density_of(at, density_kg_m3);
+        let share = 0.25e-9 * density * tet_volume(&mesh.positions, *tet);
         for &node in tet {
             mass[node as usize] += share;
         }

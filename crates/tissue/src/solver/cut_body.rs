@@ -35,4 +35,12 @@ impl Topology {
             body: None,
         }
     }
+
+    /// Of the mesh's elements.
+    pub fn laws(&self) -> elements::Laws<'_> {
+        elements::Laws {
+            of_tet: &self.region,
+            regions: &self.regions,
+        }
+    }
 }

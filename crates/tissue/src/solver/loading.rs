@@ -187,15 +187,19 @@ impl Solver {
     /// Of the body itself by node, g.
     pub(super) fn mass_of_nodes(&self) -> Vec<f64> {
         let mut mass = vec![0.0; self.positions.len()];
-        let density = self.options.material.density_g_mm3();
-        let shares = self.topology.body.as_ref().map(|body| {
+        let own = self.options.material.density_kg_m3;
+        let laws = self.topology.laws();
+        let cells = self.topology.body.as_ref().map(|body| {
             let elements = body.elements();
-            elements.map(|element| element.share).collect::<Vec<_>>()
+            elements
+                .map(|element| (element.share, element.parent as usize))
+                .collect::<Vec<_>>()
         });
         for (at, tet) in self.tets.iter().enumerate() {
-            let share = shares.as_ref().map_or(1.0, |shares| shares[at]);
-            let own = 0.25 * density * share * tet_volume(&self.positions, *tet);
-            tet.iter().for_each(|node| mass[*node as usize] += own);
+            let (share, parent) = cells.as_ref().map_or((1.0, at), |cells| cells[at]);
+            let density = 1e-6 * laws.density_of(parent, own);
+            let quarter = 0.25 * density * share * tet_volume(&self.positions, *tet);
+            tet.iter().for_each(|node| mass[*node as usize] += quarter);
         }
         mass
     }

@@ -15,7 +15,7 @@ pub(super) struct LumpedMass {
     pub mass: Vec<f64>,
     /// By node, mm³; a quarter of each element around it, times its stiffness over the material's.
     pub stiff_volume: Vec<f64>,
-    /// By element: its density over the material's, at least 1.
+    /// By element: its density over its own without scaling, at least 1.
     pub factor: Vec<f32>,
     /// Added mass over the mass of the body.
     pub added: f64,
@@ -30,26 +30,30 @@ impl LumpedMass {
         material: &Material,
         shortest_step_s: f64,
     ) -> Self {
-        let density = material.density_g_mm3();
         let mut result = Self {
             mass: vec![0.0; mesh.positions.len()],
             stiff_volume: vec![0.0; mesh.positions.len()],
             factor: Vec::with_capacity(mesh.tets.len()),
             added: 0.0,
         };
+        // Masses, g.
         let (mut plain, mut scaled) = (0.0, 0.0);
         for (element, tet) in mesh.tets.iter().enumerate() {
             let share = shares.get(element).copied().map_or(1.0, f64::from);
             let volume = tet_volume(mesh.positions, *tet) * share;
             let stiffness = f64::from(mesh.stiffness_of(element));
-            let step = element_step_s(mesh.positions, *tet, material) / stiffness.sqrt();
+            let density = mesh.laws.density_of(element, material.density_kg_m3);
+            let heavier = density / material.density_kg_m3;
+            let step =
+                element_step_s(mesh.positions, *tet, material) * (heavier / stiffness).sqrt();
             let factor = (shortest_step_s / step).powi(2).max(1.0);
-            plain += volume;
-            scaled += factor * volume;
+            let mass = 1e-6 * density * volume;
+            plain += mass;
+            scaled += factor * mass;
             result.factor.push(factor as f32);
             for node in tet {
                 result.stiff_volume[*node as usize] += 0.25 * volume * stiffness;
-                result.mass[*node as usize] += 0.25 * volume * factor * density;
+                result.mass[*node as usize] += 0.25 * factor * mass;
             }
         }
         result.added = scaled / plain - 1.0;

@@ -114,3 +114,43 @@ fn a_body_at_rest_stays_there() {
         assert!(worst < 5e-5, "{worst} mm");
     }
 }
+
+/// A body all of whose elements are of a region with a density is one of that density, scaled masses and all.
+#[test]
+fn regions_have_the_masses_of_their_density() {
+    let plain = body();
+    let mut heavy = plain.clone();
+    heavy.region = vec![1; heavy.tets.len()];
+    heavy.regions = vec![elements::Region {
+        name: "heavy".into(),
+        law: elements::Law::default(),
+        source: String::new(),
+        density_kg_m3: Some(1850.0),
+    }];
+    let masses = |mesh: &Mesh, density_kg_m3| {
+        let options = SolverOptions {
+            material: Material {
+                density_kg_m3,
+                ..Material::default()
+            },
+            mass_scaling_s: 6e-4,
+            ..SolverOptions::default()
+        };
+        let solver = Solver::new(mesh, Boundary::Fixed, options).unwrap();
+        let slots = solver.partition.slot_of_node.iter();
+        let scaled: Vec<f32> = slots.map(|slot| solver.mass[*slot as usize]).collect();
+        (scaled, solver.mass_of_nodes())
+    };
+    let (own, want) = (masses(&heavy, 1000.0), masses(&plain, 1850.0));
+    let added: f64 = want.0.iter().map(|m| f64::from(*m)).sum();
+    assert!(
+        added > 1.001 * want.1.iter().sum::<f64>(),
+        "nothing was scaled"
+    );
+    for (own, want) in own.0.iter().zip(&want.0) {
+        assert!((own / want - 1.0).abs() < 1e-5, "{own} for {want}");
+    }
+    for (own, want) in own.1.iter().zip(&want.1) {
+        assert!((own / want - 1.0).abs() < 1e-12, "{own} for {want}");
+    }
+}

@@ -48,7 +48,7 @@ pub fn unload(
     let scan = Scan {
         mesh,
         moduli: moduli_by_law(mesh, material),
-        density: material.density_g_mm3(),
+        density: material.density_kg_m3,
         factor: Factor::new(&stiffness, &mesh.positions, 1)?,
         free: stiffness.free.nodes,
         places: mesh.positions.iter().map(|x| x.map(f64::from)).collect(),
@@ -81,6 +81,7 @@ struct Scan<'a> {
     /// By number of a law.
     moduli: Vec<Moduli>,
     /// g/mm³.
+    /// kg/m³, of tetrahedra without one of their region.
     density: f64,
     factor: Factor,
     free: Vec<u32>,
@@ -159,7 +160,8 @@ impl Scan<'_> {
             }
             let moduli = self.moduli[usize::from(self.mesh.laws().number_of(at))];
             // g m/s² is mN.
-            let weight = gravity.map(|g| 0.25 * volume * self.density * g);
+            let density = 1e-6 * self.mesh.laws().density_of(at, self.density);
+            let weight = gravity.map(|g| 0.25 * volume * density * g);
             for (node, force) in corners.iter().zip(element.forces(&state, moduli)) {
                 let sum = &mut sums[*node as usize];
                 (0..3).for_each(|k| sum[k] += force[k] - weight[k]);

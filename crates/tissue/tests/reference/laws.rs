@@ -14,6 +14,7 @@ fn named(name: &str, law: &str) -> Region {
         name: name.into(),
         law: law.parse().unwrap(),
         source: "a test".into(),
+        density_kg_m3: None,
     }
 }
 
