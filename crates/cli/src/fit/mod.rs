@@ -1,7 +1,8 @@
-//! `upt fit`: a law's constants from measured curves of tension, compression and shear.
+//! `upt fit`: a law's constants from measured curves of tension, compression and shear, and Prony terms from a strain that is held.
 
 pub mod curve;
 pub mod data;
+mod hold;
 pub mod least_squares;
 pub mod plot;
 
@@ -15,17 +16,30 @@ use elements::{Law, MOST_TERMS, MooneyRivlin, Ogden};
 use serde_json::json;
 
 use data::Sample;
+use hold::Hold;
 use least_squares::Exponents;
 
 #[derive(Args)]
 #[command(after_help = "Examples:
   upt fit kidney.csv --law ogden:2 --plot kidney.svg
   upt fit brain.csv --law ogden:1 --sample cortex
-  upt fit brain.csv --law ogden:1 --exponents -18 --sample cortex --json")]
+  upt fit brain.csv --law ogden:1 --exponents -18 --sample cortex --json
+  upt fit held.csv --relaxation 2 --ramp 0.3 --plot held.svg")]
 pub struct Options {
     /// CSV file with the columns mode (tension, compression, shear), stretch (shear: amount of shear), nominal_stress_pa or
-    /// nominal_stress_kpa, and sample where it holds several.
+    /// nominal_stress_kpa, and sample where it holds several. With --relaxation the columns are time_s and force_mn, force_n, torque_mn_mm or a stress.
     data: PathBuf,
+    /// Fit so many branches of relaxation (1 to 6) to a strain that is held, instead of a law.
+    #[arg(long, value_name = "BRANCHES", conflicts_with_all = ["law", "exponents", "sample"])]
+    relaxation: Option<usize>,
+    /// How long the strain rises, at a constant rate from time 0 on, before it is held, s.
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 0.0,
+        requires = "relaxation"
+    )]
+    ramp: f64,
     /// Law to fit: ogden:TERMS, neo-hookean or mooney-rivlin.
     #[arg(long, default_value = "ogden:1")]
     law: Wanted,
@@ -122,7 +136,44 @@ fn chosen(mut samples: Vec<Sample>, asked: Option<&str>) -> Result<Sample> {
     Ok(samples.swap_remove(at))
 }
 
+/// `--relaxation`.
+fn run_hold(options: &Options, branches: usize) -> Result<ExitCode> {
+    let hold = Hold::read(&options.data, options.ramp)?;
+    let terms = hold::best(&hold, branches)
+        .with_context(|| format!("{}: cannot be fitted", options.data.display()))?;
+    let r2 = hold.r2(&terms);
+    if let Some(path) = &options.plot {
+        std::fs::write(path, plot::draw_hold(&hold, &terms))
+            .with_context(|| format!("{}: cannot be written", path.display()))?;
+    }
+    let written: Vec<String> = (terms.relaxation.iter())
+        .map(|branch| format!("{:.4},{:.4}", branch.share, branch.tau_s))
+        .collect();
+    let (written, lasting) = (written.join(","), terms.relaxation.lasting());
+    if options.json {
+        let value = json!({"relaxation": terms.relaxation, "relaxation_option": written, "at_once": terms.at_once, "unit": hold.unit, "lasting": lasting, "r2": r2});
+        println!("{}", serde_json::to_string_pretty(&value)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("--relaxation {written}");
+    println!(
+        "{:.4} {} if the strain came at once, of which {:.1} % lasts; R² of the hold {r2:.4} ({} points)",
+        terms.at_once,
+        hold.unit,
+        100.0 * lasting,
+        hold.held().count()
+    );
+    println!("linear in the strain while it rises; beyond the hold the terms extrapolate");
+    if let Some(path) = &options.plot {
+        println!("plot: {}", path.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
 pub fn run(options: &Options) -> Result<ExitCode> {
+    if let Some(branches) = options.relaxation {
+        return run_hold(options, branches);
+    }
     let sample = chosen(data::read(&options.data)?, options.sample.as_deref())?;
     let exponents = match (&options.exponents[..], options.law) {
         ([], law) => law.exponents(),

@@ -3,6 +3,7 @@
 use elements::Ogden;
 
 use super::curve::{Curve, Mode, nominal_stress};
+use super::hold::{Hold, Terms};
 use crate::plot::{Axes, Scale, colour};
 
 /// Points of a drawn curve.
@@ -71,4 +72,29 @@ pub fn draw(curves: &[Curve], laws: &[(&str, &Ogden)]) -> String {
         keys.push((curve.mode.as_str(), colour(at)));
     }
     axes.standalone(&keys)
+}
+
+/// An SVG file of a strain that is held: force or stress over time on a logarithmic axis, discs measured, a line fitted.
+pub fn draw_hold(hold: &Hold, terms: &Terms) -> String {
+    let times = || hold.points.iter().map(|[t, _]| *t).filter(|t| *t > 0.0);
+    let values = hold.points.iter().map(|[_, y]| *y).chain([terms.at_once]);
+    let [low, high] = values.fold([0.0f64, 0.0], |[low, high], y| [low.min(y), high.max(y)]);
+    let (first, last) = times().fold((f64::MAX, 0.0f64), |(a, b), t| (a.min(t), b.max(t)));
+    let mut axes = Axes::new(
+        760.0,
+        440.0,
+        Scale::log(times()),
+        Scale::linear(low, high),
+        "time since the strain began, s",
+        hold.unit,
+    );
+    let line: Vec<(f64, f64)> = (0..=STEPS)
+        .map(|k| first * (last / first).powf(k as f64 / STEPS as f64))
+        .map(|t| (t, hold.at(terms, t)))
+        .collect();
+    axes.line(&line, colour(1), 2.0, false);
+    for [t, y] in hold.points.iter().filter(|[t, _]| *t > 0.0) {
+        axes.disc(*t, *y, 3.0, colour(0), true, &format!("{t} s: {y}"));
+    }
+    axes.standalone(&[("measured", colour(0)), ("fitted", colour(1))])
 }

@@ -10,7 +10,7 @@ use clap::Args;
 use elements::{Law, Relaxation};
 use serde_json::json;
 
-/// `name, tissue, law, data, doi, source`, with a head line.
+/// `name, tissue, law, relaxation, data, doi, source`, with a head line.
 const TABLE: &str = include_str!("tissues.csv");
 
 #[derive(Args)]
@@ -32,6 +32,8 @@ pub struct Tissue<'a> {
     pub tissue: &'a str,
     /// As `--law` has it.
     pub law: &'a str,
+    /// As `--relaxation` has it; empty where none was measured.
+    pub relaxation: &'a str,
     /// What the measured stretches and shears reach.
     pub data: &'a str,
     pub doi: &'a str,
@@ -50,6 +52,7 @@ pub fn tissues() -> Vec<Tissue<'static>> {
                 name: next()?,
                 tissue: next()?,
                 law: next()?,
+                relaxation: next()?,
                 data: next()?,
                 doi: next()?,
                 source: next()?,
@@ -58,11 +61,16 @@ pub fn tissues() -> Vec<Tissue<'static>> {
         .collect()
 }
 
-/// A Prony series, or none; what clap calls for `--relaxation`.
+/// A Prony series, that of a tissue, or none; what clap calls for `--relaxation`.
 pub fn relaxation(text: &str) -> Result<Relaxation, String> {
-    match text.is_empty() {
-        true => Ok(Relaxation::default()),
-        false => Relaxation::parse(text),
+    let tissue = tissues().into_iter().find(|tissue| tissue.name == text);
+    match tissue.map(|tissue| tissue.relaxation) {
+        Some("") => Err(format!(
+            "no relaxation of `{text}` was measured; `upt materials` lists those of other tissues"
+        )),
+        Some(measured) => Relaxation::parse(measured),
+        None if text.is_empty() => Ok(Relaxation::default()),
+        None => Relaxation::parse(text),
     }
 }
 
@@ -102,7 +110,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
         let list: Vec<_> = rows
             .iter()
             .map(|(tissue, shear)| {
-                json!({"name": tissue.name, "tissue": tissue.tissue, "law": tissue.law, "shear_modulus_pa": shear,
+                json!({"name": tissue.name, "tissue": tissue.tissue, "law": tissue.law, "relaxation": tissue.relaxation, "shear_modulus_pa": shear,
                     "data": tissue.data, "doi": tissue.doi, "source": tissue.source})
             })
             .collect();
@@ -115,8 +123,12 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
     );
     for (tissue, shear) in &rows {
         let shear = shear.map_or_else(String::new, |g| format!("{g:.0}"));
+        let relaxation = match tissue.relaxation {
+            "" => String::new(),
+            text => format!("; --relaxation {text}"),
+        };
         println!(
-            "{:20}{:>10}  {:24}{:30}{} ({})",
+            "{:20}{:>10}  {:24}{:30}{} ({}{relaxation})",
             tissue.name, shear, tissue.law, tissue.doi, tissue.tissue, tissue.data
         );
     }
@@ -131,7 +143,7 @@ pub fn run(options: &Options) -> anyhow::Result<ExitCode> {
 
 #[cfg(test)]
 mod tests {
-    use super::{law, tissues};
+    use super::{law, relaxation, tissues};
 
     #[test]
     fn every_tissue_is_a_law_with_a_doi_and_a_source() {
@@ -143,6 +155,8 @@ mod tests {
             assert!(law.young_pa(0.49).unwrap() > 0.0);
             assert!(tissue.doi.starts_with("10."), "{}", tissue.doi);
             assert!(!tissue.source.is_empty() && !tissue.data.is_empty());
+            let relaxes = !tissue.relaxation.is_empty();
+            assert_eq!(relaxation(tissue.name).is_ok(), relaxes, "{}", tissue.name);
             assert_eq!(
                 all.iter().filter(|other| other.name == tissue.name).count(),
                 1

@@ -1,11 +1,12 @@
 //! `upt validate`: laws and solver against what has been measured, and against closed forms, as a page.
 //!
 //! The data of others stay where they are: `--data FOLDER` names a folder with `brain.csv` and `silicone.csv`, whose columns
-//! `docs/reference/formats.md` describes. Without it the closed forms alone are run.
+//! `docs/reference/formats.md` describes. Without it the closed forms and the published relaxation alone are run.
 
 mod brain;
 mod closed_forms;
 mod equilibrium;
+mod relaxing_rod;
 mod section;
 mod silicone;
 mod torsion;
@@ -38,6 +39,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         sections.push(brain::section(&folder.join("brain.csv"))?);
         sections.push(silicone::section(&folder.join("silicone.csv"))?);
     }
+    sections.push(relaxing_rod::section()?);
     sections.push(closed_forms::section()?);
     for section in &sections {
         println!("{}\n", section.text);
