@@ -9,6 +9,7 @@ mod equilibrium;
 mod relaxing_rod;
 mod section;
 mod silicone;
+mod specimens;
 mod torsion;
 
 use std::path::{Path, PathBuf};
@@ -37,6 +38,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     let mut sections = Vec::new();
     if let Some(folder) = &options.data {
         sections.push(brain::section(&folder.join("brain.csv"))?);
+        sections.push(specimens::section(&folder.join("brain.csv"))?);
         sections.push(silicone::section(&folder.join("silicone.csv"))?);
     }
     sections.push(relaxing_rod::section()?);
