@@ -8,6 +8,7 @@ mod breath;
 mod clock;
 mod http;
 mod instruments;
+mod measured;
 mod protocol;
 mod server;
 mod session;
@@ -23,11 +24,15 @@ use clap::Args;
 
 #[derive(Args)]
 #[command(
-    after_help = "Examples:\n  upt view onnx/brain-reduced\n  upt view onnx/brain-fast --threads 2 --port 8080"
+    after_help = "Examples:\n  upt view onnx/brain-reduced\n  upt view onnx/brain-fast --threads 2 --port 8080\n  upt view onnx/brain-coarse-reduced --tissue measured"
 )]
 pub struct Options {
     /// The bundle's folder.
     bundle: PathBuf,
+    /// Tissue of a brain: paper, as the bundle has it, or measured, with laws of human cortex, ganglia, callosum and corona radiata. That bundle is made on
+    /// the first call, within minutes, and kept in the user's cache.
+    #[arg(long, value_enum, default_value = "paper", hide_possible_values = true)]
+    tissue: measured::Tissue,
     /// Port on 127.0.0.1; 0: any free port.
     #[arg(long, default_value_t = 0)]
     port: u16,
@@ -50,19 +55,18 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         bail!("--step-ms is {ms}; a step takes 10 to 50 ms");
     }
     give_way();
+    let bundle = match options.tissue {
+        measured::Tissue::Paper => options.bundle.clone(),
+        measured::Tissue::Measured => measured::folder(&options.bundle)?,
+    };
     let listener = TcpListener::bind(("127.0.0.1", options.port)).with_context(|| {
         format!(
             "port {} on 127.0.0.1 cannot be opened; choose another with --port, or leave it out",
             options.port
         )
     })?;
-    let model = server::open(
-        &options.bundle,
-        options.threads,
-        options.step_ms,
-        options.exact,
-    )?;
-    let server = server::Server::new(&options.bundle, model, &listener)?;
+    let model = server::open(&bundle, options.threads, options.step_ms, options.exact)?;
+    let server = server::Server::new(&bundle, model, &listener)?;
     println!("{}", server.address());
     println!("open this address in a browser; Ctrl-C stops the server");
     server.serve(&listener);
