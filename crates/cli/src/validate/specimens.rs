@@ -198,8 +198,8 @@ mod tests {
     use crate::fit::curve::{Curve, Mode, nominal_stress};
     use elements::Ogden;
 
-    /// Glued ends stiffen a cube in compression by some 1.4 times (a bonded disc of its shape by 1.1 to 1.5), and a cube between plates bends as it
-    /// is sheared: 0.65 after Timoshenko, `1 / (6/5 + 1/3)`.
+    /// Glued ends stiffen a neo-Hookean cube in compression, and a cube between plates bends as it is sheared: beyond `1 / (6/5 + 1/3)` = 0.65, what
+    /// Timoshenko's beam has whose ends may warp.
     #[test]
     fn glued_ends_stiffen_a_cube_and_leave_its_shear_softer() {
         let law = Ogden::new(&[[1000.0, 2.0]]).unwrap();
@@ -210,7 +210,7 @@ mod tests {
         let pressed = of(Mode::Compression, 0.95);
         assert!((1.1..1.5).contains(&pressed.whole), "{}", pressed.whole);
         let sheared = of(Mode::Shear, 0.1);
-        assert!((0.6..0.72).contains(&sheared.whole), "{}", sheared.whole);
+        assert!((0.65..0.95).contains(&sheared.whole), "{}", sheared.whole);
     }
 
     #[test]
