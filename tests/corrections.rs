@@ -2,6 +2,7 @@
 
 mod fixture;
 
+use fixture::draw::Draw;
 use fixture::{bits, model, plain, push, rollout, scene, sparse};
 use upt::{Contact, Corrections, Error, IndexSet, SceneOptions, flag};
 
@@ -173,13 +174,8 @@ fn wild_contacts_stay_finite_and_the_tissue_comes_back() {
     let domain: Vec<u32> = model.indices(IndexSet::DomainNodes).to_vec();
     for count in [1, 3, 5, 10] {
         let scene = scene(&model, &with(Corrections::Fixed(count)));
-        let mut state = 7u64 + u64::from(count);
-        let mut unit = || {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 40) as f32 / (1u64 << 24) as f32
-        };
+        let mut draw = Draw(7 + u64::from(count));
+        let mut unit = || draw.next();
         let mut out = vec![0.0; 3 * scene.node_count()];
         for _ in 0..300 {
             let first = (unit() * (domain.len() - 4) as f32) as usize;

@@ -16,10 +16,7 @@ use upt::{Contact, Corrections, Error, Scene, SceneOptions};
 const DT: f64 = 0.05;
 
 fn corrected() -> SceneOptions {
-    SceneOptions {
-        corrections: Corrections::Fixed(8),
-        ..plain()
-    }
+    fixture::corrected(8)
 }
 
 /// The middle of the top, mm.

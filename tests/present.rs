@@ -13,10 +13,7 @@ use upt::{Contact, Corrections, Error, Scene, SceneOptions, View};
 const DT: f64 = 0.05;
 
 fn corrected() -> SceneOptions {
-    SceneOptions {
-        corrections: Corrections::Fixed(8),
-        ..plain()
-    }
+    fixture::corrected(8)
 }
 
 /// A ball of radius 3 mm that goes 8 mm/s into the middle of the top, there at `t` steps.

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::ptr::null_mut;
 use std::sync::Mutex;
 
-use host::{Host, indices};
+use host::{Host, ball};
 use serde_json::Value;
 use upt::ffi::*;
 
@@ -25,25 +25,6 @@ unsafe extern "C" fn hear(_: i32, text: *const c_char, _: *mut c_void) {
     TOLD.lock()
         .unwrap()
         .push(text.to_string_lossy().into_owned());
-}
-
-/// A ball this deep in the middle of the domain, mm.
-fn ball(host: &Host, depth: f32) -> upt_instrument {
-    let mut positions = vec![0.0f32; 3 * host.nodes];
-    let floats = positions.len() as u64;
-    let read = unsafe { upt_model_read_positions(host.model, positions.as_mut_ptr(), floats) };
-    assert_eq!(read, UPT_OK);
-    let domain = indices(host.model, UPT_SET_DOMAIN_NODES);
-    let at = 3 * domain[domain.len() / 2] as usize;
-    let mut tool: upt_instrument = unsafe { std::mem::zeroed() };
-    tool.struct_size = size_of::<upt_instrument>() as u32;
-    tool.radius = 3.0;
-    tool.position = [
-        positions[at],
-        positions[at + 1],
-        positions[at + 2] + 3.0 - depth,
-    ];
-    tool
 }
 
 fn step(host: &Host, depth: f32) {

@@ -55,6 +55,27 @@ pub fn stats(scene: *mut upt_scene) -> upt_scene_stats {
     stats
 }
 
+/// A ball of 3 mm in the middle of the domain, this deep in it, mm.
+pub fn ball(host: &Host, depth: f32) -> upt_instrument {
+    let mut positions = vec![0.0f32; 3 * host.nodes];
+    let floats = positions.len() as u64;
+    let read = unsafe { upt_model_read_positions(host.model, positions.as_mut_ptr(), floats) };
+    assert_eq!(read, UPT_OK);
+    let domain = indices(host.model, UPT_SET_DOMAIN_NODES);
+    let at = 3 * domain[domain.len() / 2] as usize;
+    // SAFETY: zeros are a value of this struct.
+    let mut tool: upt_instrument = unsafe { std::mem::zeroed() };
+    tool.struct_size = size_of::<upt_instrument>() as u32;
+    tool.radius = 3.0;
+    tool.rotation[3] = 1.0;
+    tool.position = [
+        positions[at],
+        positions[at + 1],
+        positions[at + 2] + 3.0 - depth,
+    ];
+    tool
+}
+
 pub fn indices(model: *mut upt_model, set: i32) -> Vec<u32> {
     let mut needed = 0;
     let status = unsafe { upt_model_read_indices(model, set, null_mut(), 0, &mut needed) };

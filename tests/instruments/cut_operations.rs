@@ -3,26 +3,11 @@
 //! 150 operations; 10,000 with `UPT_NIGHTLY=1`. `UPT_FUZZ_SEED` is where their numbers begin. The counts are printed.
 
 use super::*;
+use crate::fixture::draw::Draw;
 use upt::{Error, GuardPolicy, Model, ModelOptions, flag};
 
 /// Operations to a body; then the intact one takes its place.
 const TO_A_BODY: usize = 12;
-
-struct Draw(u64);
-
-impl Draw {
-    fn next(&mut self) -> f32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    fn within(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * self.next()
-    }
-}
 
 #[derive(Debug, Default)]
 struct Counts {

@@ -1,5 +1,6 @@
 //! Tools that a host had better not have: deep inside, wild, as large as the organ, or impossible and refused.
 
+use crate::fixture::draw::Draw;
 use contact::{Shape, Vector};
 use upt::contact::{Mode, Tool};
 use upt::{Contact, Error, SceneOptions, flag};
@@ -39,13 +40,8 @@ fn wild_tools_stay_finite_and_the_tissue_comes_back() {
         };
         let scene = scene(&model("tiny-corrected"), &options);
         let (at, _) = site(&scene);
-        let mut seed = 9u64;
-        let mut random = |scale: f32| {
-            seed = seed
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            scale * ((seed >> 40) as f32 / (1u64 << 23) as f32 - 1.0)
-        };
+        let mut draw = Draw(9);
+        let mut random = |scale: f32| draw.within(-scale, scale);
         for _ in 0..200 {
             let tools: Vec<Tool> = (0..2)
                 .map(|_| {

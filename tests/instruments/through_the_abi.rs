@@ -8,28 +8,7 @@ use std::ptr::{null, null_mut};
 
 use upt::ffi::*;
 
-use crate::host::{Host, indices, message};
-
-/// An instrument on the middle of the domain, this deep in it, mm.
-fn pressing(host: &Host, depth: f32) -> upt_instrument {
-    let mut positions = vec![0.0f32; 3 * host.nodes];
-    let floats = positions.len() as u64;
-    let read = unsafe { upt_model_read_positions(host.model, positions.as_mut_ptr(), floats) };
-    assert_eq!(read, UPT_OK);
-    let domain = indices(host.model, UPT_SET_DOMAIN_NODES);
-    let at = 3 * domain[domain.len() / 2] as usize;
-    // SAFETY: zeros are a value of this struct.
-    let mut tool: upt_instrument = unsafe { std::mem::zeroed() };
-    tool.struct_size = size_of::<upt_instrument>() as u32;
-    tool.radius = 3.0;
-    tool.rotation[3] = 1.0;
-    tool.position = [
-        positions[at],
-        positions[at + 1],
-        positions[at + 2] + 3.0 - depth,
-    ];
-    tool
-}
+use crate::host::{Host, ball, message};
 
 fn contacts(host: &Host, tool: &upt_instrument) -> (i32, u64) {
     let mut count = 0;
@@ -44,7 +23,7 @@ fn contacts(host: &Host, tool: &upt_instrument) -> (i32, u64) {
 #[test]
 fn what_a_step_takes_gives_contacts_too() {
     let host = Host::new("tiny-reduced", |_| ());
-    let mut ball = pressing(&host, 1.0);
+    let mut ball = ball(&host, 1.0);
     let step = |tool: &upt_instrument| unsafe {
         let input = upt_input::of_instruments(std::slice::from_ref(tool));
         upt_scene_step(host.scene, &input, null_mut(), 0)
@@ -96,7 +75,7 @@ fn no_place_with_a_capacity_is_an_error() {
             assert_eq!(find(capacity).0, UPT_ERR_NULL, "round {round}: {capacity}");
             assert!(message().contains("out is NULL"), "{}", message());
         }
-        let tool = pressing(&host, 1.0);
+        let tool = ball(&host, 1.0);
         let input = upt_input::of_instruments(std::slice::from_ref(&tool));
         let status = unsafe { upt_scene_step(host.scene, &input, null_mut(), 0) };
         assert_eq!(status, UPT_OK, "{}", message());

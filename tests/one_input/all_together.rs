@@ -2,6 +2,7 @@
 //!
 //! 160 steps; 10,000 with `UPT_NIGHTLY=1`. `UPT_FUZZ_SEED` is where their numbers begin. The counts are printed.
 
+use crate::fixture::draw::Draw;
 use upt::contact::Tool;
 use upt::{
     Bed, Contact, Corrections, GroupMotion, Loads, Model, ModelOptions, Pressure, Scene,
@@ -19,21 +20,7 @@ const PULLED_MM: [f32; 2] = [6.0, 20.0];
 /// How far the group is led in a step, mm.
 const LED_MM: f32 = 0.3;
 
-struct Draw(u64);
-
 impl Draw {
-    fn next(&mut self) -> f32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    fn within(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * self.next()
-    }
-
     fn aside(&mut self, most: f32) -> Vector {
         Vector::from([0; 3].map(|_| self.within(-most, most)))
     }

@@ -33,24 +33,10 @@ const BUNDLE: &str = "tiny-corrected";
 
 /// A ball over the middle of the domain, this deep in it, mm.
 fn ball(host: &Host, depth: f32) -> upt_instrument {
-    let mut positions = vec![0.0f32; 3 * host.nodes];
-    let floats = positions.len() as u64;
-    let read = unsafe { upt_model_read_positions(host.model, positions.as_mut_ptr(), floats) };
-    assert_eq!(read, UPT_OK);
-    let domain = indices(host.model, UPT_SET_DOMAIN_NODES);
-    let at = 3 * domain[domain.len() / 2] as usize;
-    // SAFETY: zeros are a value of this struct.
-    let mut tool: upt_instrument = unsafe { std::mem::zeroed() };
-    tool.struct_size = size_of::<upt_instrument>() as u32;
-    tool.radius = 3.0;
-    tool.rotation[3] = 1.0;
-    tool.friction = 0.2;
-    tool.position = [
-        positions[at],
-        positions[at + 1],
-        positions[at + 2] + 3.0 - depth,
-    ];
-    tool
+    upt_instrument {
+        friction: 0.2,
+        ..host::ball(host, depth)
+    }
 }
 
 /// The same for the Rust interface.
