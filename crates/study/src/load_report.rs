@@ -43,8 +43,11 @@ struct Row {
 
 /// Measures and prints the table.
 pub fn report(asked: &Options) -> Result<ExitCode> {
-    let mark = "study report --load";
-    beside::report(asked, mark, (&[0, 1, 2], &COLUMNS), |subject| {
+    let mark = match asked.tool {
+        None => "study report --load".to_owned(),
+        Some(tool) => format!("study report --load --tool {}", tool.name()),
+    };
+    beside::report(asked, &mark, (&[0, 1, 2], &COLUMNS), |subject| {
         let mut rows = Vec::new();
         for programme in &asked.load {
             eprintln!("{}: {}", subject.name, programme.name());
