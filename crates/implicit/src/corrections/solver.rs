@@ -56,7 +56,7 @@ impl ImplicitSolver {
     /// Buffers of a scene at rest.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`crate::Error::OutOfMemory`].
     pub fn new(context: SolverContext<'_>) -> Result<ImplicitSolver> {
         let env = context.env();
         let len = 3 * env.body.mass.len();
@@ -148,7 +148,7 @@ impl ImplicitSolver {
     /// A copy of what is remembered, with the forces at `contacts` nodes.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`].
+    /// [`crate::Error::OutOfMemory`].
     pub fn history(&self, contacts: usize) -> Result<History> {
         let mut motion = self.motion.copy()?;
         // The guard may have dropped the contact that they belonged to.
@@ -176,7 +176,7 @@ impl ImplicitSolver {
     /// Takes what was remembered.
     ///
     /// # Errors
-    /// [`Error::Snapshot`] for pairs of another body, a panic on another thread of the pool.
+    /// [`crate::Error::Snapshot`] for pairs of another body, a panic on another thread of the pool.
     pub fn restore(&mut self, context: SolverContext<'_>, history: &History) -> Result<()> {
         let History {
             motion,

@@ -268,7 +268,7 @@ impl ContactProblem {
         });
     }
 
-    /// The tissue starts from rest and without forces, and each tool outside of it, until [`ToolWays::return_to`].
+    /// The tissue starts from rest and without forces, and each tool outside of it, until the ways `return_to` those of the step.
     pub fn start_from_rest(&mut self, rest: &[f32]) {
         self.next.forces.clear();
         let (surface, past) = (&mut self.surface, &self.past);
