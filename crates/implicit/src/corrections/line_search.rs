@@ -6,8 +6,9 @@
 
 /// `delta`: a step is accepted where the mean of its end slopes is below this part of the first.
 const SLOPE: f64 = 1e-4;
-/// Shortenings of one step at most.
-const SHORTENINGS: u32 = 6;
+/// Shortenings of one step at most; and where a tool was put elsewhere, which comes out of the tissue over a few steps, however far the first gets.
+pub(super) const SHORTENINGS: u32 = 6;
+pub(super) const SHORTENINGS_OF_LEAP: u32 = 3;
 
 /// The search along one direction.
 pub(super) struct LineSearch {
@@ -16,6 +17,7 @@ pub(super) struct LineSearch {
     /// Part of the direction that is tried.
     pub t: f32,
     shortenings: u32,
+    most: u32,
 }
 
 /// What becomes of the part that was tried.
@@ -30,12 +32,13 @@ pub(super) enum Tried {
 }
 
 impl LineSearch {
-    /// Begins with the whole direction.
-    pub fn new(slope: f64) -> LineSearch {
+    /// Begins with the whole direction, which is shortened `most` times.
+    pub fn new(slope: f64, most: u32) -> LineSearch {
         LineSearch {
             slope,
             t: 1.0,
             shortenings: 0,
+            most,
         }
     }
 
@@ -45,7 +48,7 @@ impl LineSearch {
         if is_sound && 0.5 * (self.slope + slope_new) <= SLOPE * self.slope {
             return Tried::Accepted;
         }
-        if self.shortenings == SHORTENINGS || self.slope >= 0.0 {
+        if self.shortenings == self.most || self.slope >= 0.0 {
             return Tried::GivenUp;
         }
         self.shortenings += 1;
@@ -66,17 +69,20 @@ mod tests {
     fn takes_the_minimum_of_a_parabola_and_halves_what_is_not_sound() {
         // phi(t) = (t - 0.3)²: its slope is 2 (t - 0.3).
         let slope = |t: f32| 2.0 * (f64::from(t) - 0.3);
-        let mut search = LineSearch::new(slope(0.0));
+        let mut search = LineSearch::new(slope(0.0), SHORTENINGS);
         assert_eq!(search.judge(true, slope(1.0)), Tried::Shortened);
         assert!((search.t - 0.3).abs() < 1e-6, "{}", search.t);
         assert_eq!(search.judge(true, slope(search.t)), Tried::Accepted);
 
-        let mut search = LineSearch::new(-1.0);
+        let mut search = LineSearch::new(-1.0, SHORTENINGS);
         for shortenings in 1..=SHORTENINGS {
             assert_eq!(search.judge(false, -1.0), Tried::Shortened);
             assert_eq!(search.t, 0.5f32.powi(shortenings as i32));
         }
         assert_eq!(search.judge(false, -1.0), Tried::GivenUp);
-        assert_eq!(LineSearch::new(1.0).judge(true, 1.0), Tried::GivenUp);
+        assert_eq!(
+            LineSearch::new(1.0, SHORTENINGS).judge(true, 1.0),
+            Tried::GivenUp
+        );
     }
 }

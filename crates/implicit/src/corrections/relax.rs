@@ -4,7 +4,7 @@
 use crate::clock::Instant;
 
 use super::input::{Input, Report, SolverContext};
-use super::line_search::{LineSearch, Tried};
+use super::line_search::{LineSearch, SHORTENINGS, Tried};
 use super::passes;
 use super::precondition::mask;
 use super::solver::{ImplicitSolver, SMALLEST_DET};
@@ -115,7 +115,7 @@ impl ImplicitSolver {
             &mut slope,
         )?;
         let [slope] = slope;
-        let mut search = LineSearch::new(slope);
+        let mut search = LineSearch::new(slope, SHORTENINGS);
         loop {
             let t = search.t;
             // `q = u + t d`: the state tried.

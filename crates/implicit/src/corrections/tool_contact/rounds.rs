@@ -104,9 +104,10 @@ impl ToolStep<'_> {
             let better = self.improve_at(at, 1.0)?;
             self.report.iterations += 1;
             made.iterations += 1;
-            // A failure forgets the pairs, so that the next direction is another one: where that fails too, nothing helps.
+            // A failure forgets the pairs, so that the next direction is another one: where that fails too, nothing helps. A leap is not
+            // worth a second one.
             made.failed = if better { 0 } else { made.failed + 1 };
-            if made.failed > 1 {
+            if made.failed > u32::from(!self.problem.ways.has_leapt) {
                 return Ok(());
             }
             // What is left to go: the last move, less by as much as the residual is, as if the moves were a geometric series.
