@@ -128,6 +128,24 @@ namespace Upt.Tests
             Frames(tissue, 3, frame => { });
             Assert.That(shown.GetTriangles(1).Length, Is.EqualTo(0));
             AssertClosed(shown);
+            // Undone in the middle of a stroke the scalpel waits until it has been off.
+            Action<int> cut = frame =>
+            {
+                float x = low.x - 0.003f + (high.x - low.x) * frame / 110f;
+                scalpel.transform.position = new Vector3(x, high.y - 0.012f, z);
+            };
+            scalpel.active = true;
+            Frames(tissue, 30, cut);
+            Assert.That(shown.GetTriangles(1).Length, Is.GreaterThan(0), "a second cut");
+            Assert.That(tissue.Undo());
+            Frames(tissue, 30, frame => cut(30 + frame));
+            Assert.That(shown.GetTriangles(1).Length, Is.EqualTo(0), "at work when it was undone");
+            scalpel.active = false;
+            Frames(tissue, 6, frame => { });
+            scalpel.active = true;
+            Frames(tissue, 30, frame => cut(30 + frame));
+            Assert.That(shown.GetTriangles(1).Length, Is.GreaterThan(0), "off and on again");
+            scalpel.active = false;
             tissue.ResetTissue();
             Frames(tissue, 3, frame => { });
             Assert.That(tissue.GetComponent<MeshFilter>().sharedMesh, Is.SameAs(whole));

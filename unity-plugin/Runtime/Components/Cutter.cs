@@ -28,6 +28,9 @@ namespace Upt
 
         internal bool IsInStroke { get; private set; }
 
+        /// <summary>Its stroke has been undone while it was at work: it waits until it is not.</summary>
+        internal bool IsUndone;
+
         /// <summary>Number of the stroke that goes on, and the body before it, until it has changed.</summary>
         internal int Stroke;
         internal byte[] Before;

@@ -43,7 +43,8 @@ namespace Upt
         }
 
         /// <summary>Puts the body back to what it was before the last stroke of a cutter; false where there is none. Waits for a step in
-        /// flight.</summary>
+        /// flight. A cutter that is at work then works again once <see cref="Cutter.active"/> has been off: a blade that is still in the tissue
+        /// would begin another stroke at once.</summary>
         public bool Undo()
         {
             if (!IsRunning || undone.Count == 0) return false;
@@ -55,7 +56,11 @@ namespace Upt
             scene.Restore(undone[undone.Count - 1]);
             undone.RemoveAt(undone.Count - 1);
             foreach (Cutter cutter in cutters)
-                if (cutter != null) cutter.Rest();
+            {
+                if (cutter == null) continue;
+                cutter.IsUndone = cutter.IsInStroke;
+                cutter.Rest();
+            }
             cutMesh.Follow(scene);
             return true;
         }
@@ -70,8 +75,10 @@ namespace Upt
                 if (!cutter.IsReady)
                 {
                     if (cutter.IsInStroke) EndStroke(cutter);
+                    cutter.IsUndone = false;
                     continue;
                 }
+                if (cutter.IsUndone) continue;
                 bool begins = !cutter.IsInStroke;
                 if (begins) BeginStroke(cutter);
                 upt_cut made = default(upt_cut);
