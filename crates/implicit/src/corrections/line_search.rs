@@ -6,9 +6,9 @@
 
 /// `delta`: a step is accepted where the mean of its end slopes is below this part of the first.
 const SLOPE: f64 = 1e-4;
-/// Shortenings of one step at most; and where a tool was put elsewhere, which comes out of the tissue over a few steps, however far the first gets.
+/// Shortenings of one step at most; and where each of them is dear, in a step whose tool comes out of the tissue over a few steps anyway.
 pub(super) const SHORTENINGS: u32 = 6;
-pub(super) const SHORTENINGS_OF_LEAP: u32 = 3;
+pub(super) const DEAR_SHORTENINGS: u32 = 3;
 
 /// The search along one direction.
 pub(super) struct LineSearch {

@@ -7,7 +7,7 @@ use super::linear::WHAT;
 use super::step::{add, dot, resize};
 use super::{Gain, LocalSolver, StepContext, each_load};
 use crate::contact::{Compliance, ContactProblem, State};
-use crate::corrections::line_search::{LineSearch, SHORTENINGS, SHORTENINGS_OF_LEAP, Tried};
+use crate::corrections::line_search::{DEAR_SHORTENINGS, LineSearch, SHORTENINGS, Tried};
 use crate::corrections::precondition::{DIAGONAL_WEIGHT, Env};
 use crate::corrections::solver::SMALLEST_DET;
 use crate::corrections::tool_contact::SUNK_MM;
@@ -37,8 +37,8 @@ impl LocalSolver {
         // Along a line the loads do not change, so their work is a constant of the slopes.
         let work = self.work(problem);
         let slope = self.residuals.residual.over(&self.d.step) - work;
-        let most = match problem.ways.has_leapt {
-            true => SHORTENINGS_OF_LEAP,
+        let most = match self.is_dear(problem) {
+            true => DEAR_SHORTENINGS,
             false => SHORTENINGS,
         };
         let mut search = LineSearch::new(slope, most);

@@ -222,6 +222,12 @@ impl LocalSolver {
         holds
     }
 
+    /// Whether a direction is not worth many tries: a leap's, of a body that is far in part. What inverts elements there leads into the tissue that the tool was
+    /// put into, and not out of it.
+    pub(super) fn is_dear(&self, problem: &ContactProblem) -> bool {
+        problem.ways.has_leapt && !self.near.is_all()
+    }
+
     /// The level that the next step begins with, `u` being the state of this one.
     pub(super) fn next_level(&self, u: &[f32]) -> usize {
         if self.reach.touched.is_empty() {

@@ -110,6 +110,11 @@ impl NearSet {
         (place != NONE).then_some(place as usize)
     }
 
+    /// Whether all of the body is near.
+    pub fn is_all(&self) -> bool {
+        self.nodes.len() == self.places.len()
+    }
+
     /// Whether a free node is inside.
     pub fn holds(&self, node: u32) -> bool {
         (self.places[node as usize] as usize) < self.inside

@@ -104,10 +104,12 @@ impl ToolStep<'_> {
             let better = self.improve_at(at, 1.0)?;
             self.report.iterations += 1;
             made.iterations += 1;
-            // A failure forgets the pairs, so that the next direction is another one: where that fails too, nothing helps. A leap is not
-            // worth a second one.
+            // A failure forgets the pairs, so that the next direction is another one: where that fails too, nothing helps. Where it is dear
+            // none is worth a second one.
             made.failed = if better { 0 } else { made.failed + 1 };
-            if made.failed > u32::from(!self.problem.ways.has_leapt) {
+            let is_dear =
+                (self.solver.local.as_ref()).is_some_and(|local| local.is_dear(self.problem));
+            if made.failed > u32::from(!is_dear) {
                 return Ok(());
             }
             // What is left to go: the last move, less by as much as the residual is, as if the moves were a geometric series.

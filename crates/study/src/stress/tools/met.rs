@@ -13,7 +13,7 @@ const MOST_MM: f64 = 1.0;
 const GOAL_MM: f64 = 0.3;
 /// Frames that are shown between two steps.
 const FRAMES: usize = 2;
-/// A hand may miss the tissue for so many calls, ms, and for more in one place of so many: where a step loses the tool, the hand does.
+/// A hand may miss the tissue for so many calls, ms, and for more in one place, and one more of so many: where a step loses the tool, the hand does.
 const MISSED: usize = 5;
 const HANDS: usize = 100;
 /// A tool so far beneath the surface at rest must be met, mm.
@@ -184,7 +184,7 @@ impl Met {
         let met = match all_held {
             true => {
                 let missed = places - self.felt;
-                let between = all(self.frames.held) && HANDS * missed <= places;
+                let between = all(self.frames.held) && missed <= 1 + places / HANDS;
                 all(self.found) && all(self.steps.held) && (between || !self.between)
             }
             false => all(self.told) && self.silent == 0,
