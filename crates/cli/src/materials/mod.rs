@@ -61,8 +61,11 @@ pub fn tissues() -> Vec<Tissue<'static>> {
         .collect()
 }
 
-/// A Prony series, that of a tissue, or none; what clap calls for `--relaxation`.
+/// A Prony series, that of a tissue, one as a manifest has it, or none; what clap calls for `--relaxation`.
 pub fn relaxation(text: &str) -> Result<Relaxation, String> {
+    if text.starts_with('[') {
+        return serde_json::from_str(text).map_err(|error| format!("`{text}`: {error}"));
+    }
     let tissue = tissues().into_iter().find(|tissue| tissue.name == text);
     match tissue.map(|tissue| tissue.relaxation) {
         Some("") => Err(format!(
@@ -83,8 +86,11 @@ pub fn source_of(law: &Law) -> String {
     })
 }
 
-/// A law by its formula or by the name of a tissue; what clap calls for `--law`.
+/// A law by its formula, by the name of a tissue or as a manifest has it; what clap calls for `--law`.
 pub fn law(text: &str) -> Result<Law, String> {
+    if text.starts_with('{') {
+        return serde_json::from_str(text).map_err(|error| format!("`{text}`: {error}"));
+    }
     match tissues().into_iter().find(|tissue| tissue.name == text) {
         Some(tissue) => tissue.law.parse(),
         None => text.parse().map_err(|error: String| {
@@ -155,7 +161,17 @@ mod tests {
             assert!(law.young_pa(0.49).unwrap() > 0.0);
             assert!(tissue.doi.starts_with("10."), "{}", tissue.doi);
             assert!(!tissue.source.is_empty() && !tissue.data.is_empty());
+            // As a manifest has it, by which `cargo xtask demo` simulates for a bundle.
+            let written = serde_json::to_string(&law).unwrap();
+            assert_eq!(super::law(&written).unwrap().to_string(), tissue.law);
             let relaxes = !tissue.relaxation.is_empty();
+            if let Ok(series) = relaxation(tissue.name) {
+                let written = serde_json::to_string(&series).unwrap();
+                assert_eq!(
+                    relaxation(&written).unwrap().to_string(),
+                    series.to_string()
+                );
+            }
             assert_eq!(relaxation(tissue.name).is_ok(), relaxes, "{}", tissue.name);
             assert_eq!(
                 all.iter().filter(|other| other.name == tissue.name).count(),
