@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use anyhow::bail;
+use anyhow::anyhow;
 use clap::Args;
 
 /// Takes anything.
@@ -16,7 +16,12 @@ pub struct Options {
 /// Always an error.
 pub fn run(feature: &str, options: &Options) -> anyhow::Result<ExitCode> {
     let _ = &options.rest;
-    bail!(
+    Err(missing(feature))
+}
+
+/// That a feature is needed.
+pub fn missing(feature: &str) -> anyhow::Error {
+    anyhow!(
         "this is the small `upt` of `cargo xtask demo`, built without the feature `{feature}`: in the clone, `cargo build --release -p upt-cli` builds the whole command, target/release/upt"
     )
 }

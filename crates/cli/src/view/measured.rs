@@ -6,20 +6,11 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use clap::{Parser, ValueEnum};
+use clap::Parser;
 use foreign::python;
 use yardstick::bundle_folder::BundleFolder;
 
 use crate::make;
-
-/// What an organ is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Tissue {
-    /// As the bundle has it.
-    Paper,
-    /// By measured laws.
-    Measured,
-}
 
 /// Regions and their tissues, as `upt make` takes them; the tissue of what is left comes first.
 const REST: &str = "corona-radiata";

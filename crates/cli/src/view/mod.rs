@@ -8,6 +8,7 @@ mod breath;
 mod clock;
 mod http;
 mod instruments;
+#[cfg(feature = "linear")]
 mod measured;
 mod protocol;
 mod server;
@@ -20,7 +21,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
-use clap::Args;
+use clap::{Args, ValueEnum};
+
+/// What an organ is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Tissue {
+    /// As the bundle has it.
+    Paper,
+    /// By measured laws.
+    Measured,
+}
 
 #[derive(Args)]
 #[command(
@@ -32,7 +42,7 @@ pub struct Options {
     /// Tissue of a brain: paper, as the bundle has it, or measured, with laws of human cortex, ganglia, callosum and corona radiata. That bundle is made on
     /// the first call, within minutes, and kept in the user's cache.
     #[arg(long, value_enum, default_value = "paper", hide_possible_values = true)]
-    tissue: measured::Tissue,
+    tissue: Tissue,
     /// Port on 127.0.0.1; 0: any free port.
     #[arg(long, default_value_t = 0)]
     port: u16,
@@ -56,8 +66,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     }
     give_way();
     let bundle = match options.tissue {
-        measured::Tissue::Paper => options.bundle.clone(),
-        measured::Tissue::Measured => measured::folder(&options.bundle)?,
+        Tissue::Paper => options.bundle.clone(),
+        #[cfg(feature = "linear")]
+        Tissue::Measured => measured::folder(&options.bundle)?,
+        #[cfg(not(feature = "linear"))]
+        Tissue::Measured => return Err(crate::left_out::missing("linear")),
     };
     let listener = TcpListener::bind(("127.0.0.1", options.port)).with_context(|| {
         format!(
