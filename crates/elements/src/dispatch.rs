@@ -43,17 +43,18 @@ unsafe fn all_forces<L: Eigenvalues, const AVERAGED: bool>(
     forces: *mut [f32; 4],
 ) -> f32 {
     unsafe {
-        match partition.moduli_of(chunk).law {
-            Law::NeoHookean(law) => {
+        let law = partition.moduli_of(chunk).law;
+        match (law, law.grows()) {
+            // One kernel for all of these: code is what a law costs those who do not use it.
+            (_, Some(grows)) => forces_by::<L, _, AVERAGED>(grows, partition, chunk, nodes, forces),
+            (Law::NeoHookean(law), _) => {
                 forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
             }
-            Law::MooneyRivlin(law) => {
+            (Law::MooneyRivlin(law), _) => {
                 forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
             }
-            Law::Ogden(_) => forces_by_stretches::<L, AVERAGED>(partition, chunk, nodes, forces),
-            Law::Yeoh(law) => forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces),
-            Law::VerondaWestmann(law) => {
-                forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
+            (Law::Ogden(_) | Law::Yeoh(_) | Law::VerondaWestmann(_), None) => {
+                forces_by_stretches::<L, AVERAGED>(partition, chunk, nodes, forces)
             }
         }
     }

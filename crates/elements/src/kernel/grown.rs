@@ -18,11 +18,7 @@ pub(super) unsafe fn grown<L: NodeLanes>(
     unsafe {
         let root = inverse_cube_root(x.add(L::splat(1.0)));
         let x = root.mul_add(L::splat(3.0), L::splat(-3.0));
-        let growth = match grows {
-            Grows::Yeoh(law) => law.lane_growth(x),
-            Grows::VerondaWestmann(law) => law.lane_growth(x),
-        };
-        let first = growth.mul(root).mul(L::splat(a));
+        let first = grows.lane_growth(x).mul(root).mul(L::splat(a));
         // 1 / (r (1 + x')) is r².
         let second = root.mul(root).mul(L::splat(b));
         let mean = j2.mul(L::splat(2.0 / 3.0));
