@@ -3,7 +3,7 @@
 //! Stress, energy and tangent are those of a law with the terms `2 u'(x)` of exponent 2 and `-2 c` of exponent -2 ([`super::Stretches`]), but that the first
 //! changes with the shape: a law gives `u`, `h = u' / u'(0)` and its slope.
 
-use super::{Grows, Invariants, Isochoric, LaneSlopes, Slopes, VerondaWestmann, Yeoh};
+use super::{Invariants, Isochoric, LaneSlopes, Slopes};
 use lanes::FunctionLanes;
 
 /// What such a law is made of.
@@ -25,45 +25,6 @@ pub trait Growing: Copy {
     /// # Safety
     /// As for `Lanes`. No closures, see `kernel`.
     unsafe fn lane_growth<L: FunctionLanes>(self, x: L) -> L;
-}
-
-impl Growing for Grows {
-    const GROWTH_FLOPS: usize = match Yeoh::GROWTH_FLOPS > VerondaWestmann::GROWTH_FLOPS {
-        true => Yeoh::GROWTH_FLOPS,
-        false => VerondaWestmann::GROWTH_FLOPS,
-    };
-
-    fn parts(self) -> [f64; 2] {
-        match self {
-            Self::Yeoh(law) => law.parts(),
-            Self::VerondaWestmann(law) => law.parts(),
-        }
-    }
-
-    fn stored(self, x: f64) -> f64 {
-        match self {
-            Self::Yeoh(law) => law.stored(x),
-            Self::VerondaWestmann(law) => law.stored(x),
-        }
-    }
-
-    fn growth(self, x: f64) -> [f64; 2] {
-        match self {
-            Self::Yeoh(law) => law.growth(x),
-            Self::VerondaWestmann(law) => law.growth(x),
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn lane_growth<L: FunctionLanes>(self, x: L) -> L {
-        // SAFETY: the caller's.
-        unsafe {
-            match self {
-                Self::Yeoh(law) => law.lane_growth(x),
-                Self::VerondaWestmann(law) => law.lane_growth(x),
-            }
-        }
-    }
 }
 
 impl<G: Growing> Isochoric for G {

@@ -11,6 +11,7 @@
 //!
 //! REQ-081: The stress of every law is the derivative of its energy, on every instruction set.
 
+mod grows;
 mod growth;
 mod isochoric;
 mod mooney_rivlin;
@@ -26,6 +27,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
+pub(crate) use grows::Grows;
 pub use growth::Growing;
 pub use isochoric::{Invariants, Isochoric, LaneSlopes, Slopes};
 pub use mooney_rivlin::MooneyRivlin;
@@ -49,13 +51,6 @@ pub enum Law {
     /// `w = (x + C2/C1 x² + C3/C1 x³) / 2` with `x = J^(-2/3) I1 - 3`.
     Yeoh(Yeoh),
     /// `w = (exp(beta x) - 1) / beta - (J^(-4/3) I2 - 3) / 2`.
-    VerondaWestmann(VerondaWestmann),
-}
-
-/// A law whose part by `I1` grows with it.
-#[derive(Clone, Copy)]
-pub(crate) enum Grows {
-    Yeoh(Yeoh),
     VerondaWestmann(VerondaWestmann),
 }
 
