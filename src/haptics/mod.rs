@@ -24,6 +24,7 @@ mod ends;
 mod modes;
 mod passivity;
 pub(crate) mod publish;
+mod pushed;
 mod render;
 mod snapshot;
 mod solver;

@@ -3,6 +3,7 @@
 use ::contact::{Body, Contact, Law, Limits, Pose, Spring, Sweeps, Vector, Whole};
 
 use super::modes::Modes;
+use super::pushed::Pushed;
 use super::snapshot::{ContactSnapshot, MOST_SAMPLES};
 use super::stiffness::{Direction, Stiffness};
 use crate::contact::Pair;
@@ -32,12 +33,9 @@ pub struct Solver {
     pub modes: Modes,
     /// How long support groups have carried the samples since the step, s.
     carried_s: f64,
-    /// By sample: the force on it, mN; its place, mm; how far forces have moved it since the step `[3n]`, mm, and how far they will have
-    /// moved it if they stay as they are.
-    forces: Vec<Vector>,
-    points: Vec<Vector>,
-    moved: Vec<f32>,
-    aim: Vec<f32>,
+    samples: Pushed,
+    /// What they were before a solve, to which one that loses the tool goes back.
+    before: Pushed,
     /// The samples of a solve by their distance, their contacts and forces, and `W` among them.
     rows: Vec<(f32, usize)>,
     contacts: Vec<Contact>,
@@ -49,8 +47,6 @@ pub struct Solver {
     pub nearest: f32,
     /// All samples that the step pushed have slid off the tool since it. Until the next step they are the tissue's plane beneath it.
     slid: bool,
-    /// Forces, `moved` and `aim` before a solve, to which one that loses the tool goes back.
-    before: (Vec<Vector>, Vec<f32>, Vec<f32>),
 }
 
 impl Solver {
@@ -59,16 +55,13 @@ impl Solver {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn new(modes: Modes) -> Result<Solver> {
-        let vectors = |count| memory::filled(count, Vector::ZERO, WHAT);
         let mut sweeps = Sweeps::default();
         memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
         Ok(Solver {
             modes,
             carried_s: 0.0,
-            forces: vectors(MOST_SAMPLES)?,
-            points: vectors(MOST_SAMPLES)?,
-            moved: memory::zeros(3 * MOST_SAMPLES, WHAT)?,
-            aim: memory::zeros(3 * MOST_SAMPLES, WHAT)?,
+            samples: Pushed::new()?,
+            before: Pushed::new()?,
             rows: memory::room(MOST_SAMPLES, WHAT)?,
             contacts: memory::room(MOST_ROWS, WHAT)?,
             solved: memory::room(MOST_ROWS, WHAT)?,
@@ -77,45 +70,20 @@ impl Solver {
             stiffness: Stiffness::new()?,
             nearest: f32::MAX,
             slid: false,
-            before: (
-                vectors(MOST_SAMPLES)?,
-                memory::zeros(3 * MOST_SAMPLES, WHAT)?,
-                memory::zeros(3 * MOST_SAMPLES, WHAT)?,
-            ),
         })
     }
 
-    /// Starts anew from the state of a step. What the hand's forces moved since the last one is dropped: the step has it.
+    /// Starts anew from the state of a step.
     pub fn begin(&mut self, snapshot: &ContactSnapshot) {
         self.modes.begin(&snapshot.velocity);
         self.carried_s = 0.0;
         self.slid = false;
-        self.forces[..snapshot.count].copy_from_slice(&snapshot.forces[..snapshot.count]);
-        self.points[..snapshot.count].copy_from_slice(&snapshot.points[..snapshot.count]);
-        self.moved.fill(0.0);
-        self.aim.fill(0.0);
-    }
-
-    /// Adds a change of the force on a sample: it moves all samples by `part` of `W` times the change now, and by the rest later.
-    fn change(&mut self, snapshot: &ContactSnapshot, at: usize, change: Vector, part: f32) {
-        if change == Vector::ZERO {
-            return;
-        }
-        let all = 3 * snapshot.count;
-        for (axis, change) in change.to_array().into_iter().enumerate() {
-            // Symmetric: a row is a column.
-            let row = &snapshot.delassus[(3 * at + axis) * all..][..all];
-            let moves = self.moved.iter_mut().zip(&mut self.aim).zip(row);
-            for ((moved, aim), w) in moves {
-                *aim += change * w;
-                *moved += part * change * w;
-            }
-        }
+        self.samples.begin(snapshot);
     }
 
     /// Samples with a force.
     pub fn pushing(&self, count: usize) -> impl Iterator<Item = usize> {
-        (0..count).filter(|at| self.forces[*at] != Vector::ZERO)
+        self.samples.pushing(count)
     }
 
     /// Lets time pass for the modes and what support groups carry.
@@ -129,7 +97,7 @@ impl Solver {
         let m = snapshot.modes;
         let axis = |k: usize| {
             let row = 3 * at + k;
-            self.moved[row]
+            self.samples.moved[row]
                 + self
                     .modes
                     .moved(&snapshot.at_samples[row * m..(row + 1) * m])
@@ -138,15 +106,9 @@ impl Solver {
         snapshot.points[at] + carried + Vector::new(axis(0), axis(1), axis(2))
     }
 
-    /// Lets samples follow the forces so far, `delay_s x' + x = W f` by backward Euler. Gives the part of a change of the forces that
-    /// moves them within that time.
+    /// [`Pushed::follow`].
     pub fn follow(&mut self, snapshot: &ContactSnapshot, seconds: f32) -> f32 {
-        let whole = seconds + snapshot.delay_s;
-        let part = if whole > 0.0 { seconds / whole } else { 1.0 };
-        for (moved, aim) in self.moved.iter_mut().zip(&self.aim) {
-            *moved += part * (aim - *moved);
-        }
-        part
+        self.samples.follow(snapshot.delay_s, seconds)
     }
 
     /// [`Solver::solve_once`], and again where it loses the tool.
@@ -163,16 +125,12 @@ impl Solver {
     ) {
         let pushed = !self.slid && self.pushing(snapshot.count).next().is_some();
         if pushed {
-            self.before.0.copy_from_slice(&self.forces);
-            self.before.1.copy_from_slice(&self.moved);
-            self.before.2.copy_from_slice(&self.aim);
+            self.before.copy_from(&self.samples);
         }
         self.solve_once(snapshot, body, friction, way, part);
         if pushed && self.pushing(snapshot.count).next().is_none() {
             self.slid = true;
-            self.forces.copy_from_slice(&self.before.0);
-            self.moved.copy_from_slice(&self.before.1);
-            self.aim.copy_from_slice(&self.before.2);
+            self.samples.copy_from(&self.before);
             self.solve_once(snapshot, body, friction, way, part);
         }
     }
@@ -208,7 +166,7 @@ impl Solver {
         self.rows.clear();
         self.nearest = f32::MAX;
         for at in 0..snapshot.count {
-            let pushed = self.forces[at] != Vector::ZERO;
+            let pushed = self.samples.forces[at] != Vector::ZERO;
             let point = self.touched_at(snapshot, body, at, now);
             let outside = point.cmplt(low).any() || point.cmpgt(high).any();
             let tied = snapshot.ties[at].is_some();
@@ -229,8 +187,8 @@ impl Solver {
                 .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             for row in MOST_ROWS..self.rows.len() {
                 let (_, at) = self.rows[row];
-                let force = std::mem::take(&mut self.forces[at]);
-                self.change(snapshot, at, -force, part);
+                let force = std::mem::take(&mut self.samples.forces[at]);
+                self.samples.change(snapshot, at, -force, part);
             }
             self.rows.truncate(MOST_ROWS);
             self.rows.sort_unstable_by_key(|row| row.1);
@@ -240,7 +198,7 @@ impl Solver {
         self.solved.clear();
         self.w.clear();
         for &(_, at) in &self.rows {
-            let force = self.forces[at];
+            let force = self.samples.forces[at];
             let error = snapshot.errors[at];
             let pair = Pair {
                 body,
@@ -252,7 +210,10 @@ impl Solver {
                 swept: true,
                 way_out: None,
             };
-            let (point, start) = (self.touched_at(snapshot, body, at, now), self.points[at]);
+            let (point, start) = (
+                self.touched_at(snapshot, body, at, now),
+                self.samples.points[at],
+            );
             let mut contact = match &snapshot.ties[at] {
                 Some(tie) => pulling(tie, now, point),
                 None => pair.contact(point, start, snapshot.outward[at], force),
@@ -280,13 +241,13 @@ impl Solver {
         );
         for row in 0..self.rows.len() {
             let ((_, at), force) = (self.rows[row], self.solved[row]);
-            let change = force - self.forces[at];
-            self.forces[at] = force;
-            self.change(snapshot, at, change, part);
+            let change = force - self.samples.forces[at];
+            self.samples.forces[at] = force;
+            self.samples.change(snapshot, at, change, part);
         }
         for at in 0..snapshot.count {
             // A tie pulls the tool at its own end.
-            self.points[at] = match &snapshot.ties[at] {
+            self.samples.points[at] = match &snapshot.ties[at] {
                 Some(tie) => now.transform_point(tie.place),
                 None => self.touched_at(snapshot, body, at, now),
             };
@@ -294,7 +255,7 @@ impl Solver {
         let m = snapshot.modes;
         self.modes.push.fill(0.0);
         for at in 0..snapshot.count {
-            let change = self.forces[at] - snapshot.forces[at];
+            let change = self.samples.forces[at] - snapshot.forces[at];
             if change == Vector::ZERO {
                 continue;
             }
@@ -310,8 +271,8 @@ impl Solver {
     pub fn wrench(&self, count: usize, about: Vector) -> [Vector; 2] {
         let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
         for at in self.pushing(count) {
-            force -= self.forces[at];
-            torque -= (self.points[at] - about).cross(self.forces[at]);
+            force -= self.samples.forces[at];
+            torque -= (self.samples.points[at] - about).cross(self.samples.forces[at]);
         }
         [force, torque]
     }
@@ -319,7 +280,7 @@ impl Solver {
     pub fn stiffness(&mut self, snapshot: &ContactSnapshot, about: Vector) -> [f32; 36] {
         self.stiffness.directions.clear();
         for (&(_, at), contact) in self.rows.iter().zip(&self.contacts) {
-            let force = self.forces[at];
+            let force = self.samples.forces[at];
             if force == Vector::ZERO {
                 continue;
             }
@@ -335,7 +296,7 @@ impl Solver {
                 self.stiffness.add(Direction {
                     sample: at,
                     along: *along,
-                    arm: self.points[at] - about,
+                    arm: self.samples.points[at] - about,
                 });
             }
         }
@@ -375,16 +336,18 @@ mod tests {
         solver.begin(&snapshot);
         let mut force = Vector::new(50.0, 0.0, 0.0);
         let part = solver.follow(&snapshot, 1e-3);
-        solver.change(&snapshot, 0, force, part);
-        let mut places = vec![solver.moved[0]];
+        solver.samples.change(&snapshot, 0, force, part);
+        let mut places = vec![solver.samples.moved[0]];
         let mut work = force.x * places[0];
         for tick in 1..200 {
             let part = solver.follow(&snapshot, 1e-3);
             let wanted = if tick < 100 { 50.0 } else { 0.0 };
-            solver.change(&snapshot, 0, Vector::new(wanted, 0.0, 0.0) - force, part);
+            solver
+                .samples
+                .change(&snapshot, 0, Vector::new(wanted, 0.0, 0.0) - force, part);
             force.x = wanted;
-            work += force.x * (solver.moved[0] - places[tick - 1]);
-            places.push(solver.moved[0]);
+            work += force.x * (solver.samples.moved[0] - places[tick - 1]);
+            places.push(solver.samples.moved[0]);
         }
         // One part in five of what is left in each millisecond, to 50 mN on 0.02 mm/mN.
         assert!((places[0] - 0.2).abs() < 1e-5, "{}", places[0]);

@@ -59,7 +59,7 @@ LARGER: dict[str, tuple[int, int]] = {
     "upt::Published": (12, 8),
     "upt::Recorder": (11, 11),
     "upt::Scene": (7, 63),
-    "upt::Solver": (15, 12),
+    "upt::Solver": (12, 12),
     "upt::Stepped": (11, 0),
     "upt::UptEngine": (13, 15),
     "upt::UptModel": (12, 8),
