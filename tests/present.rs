@@ -2,6 +2,8 @@
 #![cfg(feature = "instruments")]
 
 mod fixture;
+#[path = "present/pierced.rs"]
+mod pierced;
 #[path = "present/relaxing.rs"]
 mod relaxing;
 

@@ -287,16 +287,24 @@ impl Between {
                 }
             };
             // Where the tissue goes on as it went a quick or thin tool may have lost it, as often as it is pressed: then it stays where the step left it.
-            for (free, pushed) in [(&*self.free, Moves::Pushed), (last, Moves::Stays)] {
+            for pushed in [Moves::Pushed, Moves::Stays] {
+                if pushed == Moves::Stays {
+                    let nodes = self.problem.surface.samples.nodes();
+                    self.led.stay(groups, nodes, last, &mut self.free);
+                    q.fill(0.0);
+                }
                 self.problem.begin_frame(tools, rest, last)?;
                 self.problem.tied.step_s = tau as f32;
                 let state = State {
                     rest,
-                    u: free,
+                    u: &self.free,
                     start: last,
                 };
                 if tau <= AT_ONCE_S || !self.problem.is_near(state)? {
-                    return Ok(Moves::Nothing);
+                    return Ok(match pushed {
+                        Moves::Stays => Moves::Stays,
+                        _ => Moves::Nothing,
+                    });
                 }
                 let compliance = Compliance::at_rest(
                     prior,
@@ -312,7 +320,7 @@ impl Between {
                     }
                     let means = (self.isa, &self.pool, &**prior);
                     let nodes = (self.problem.surface.samples.nodes(), &*self.held);
-                    self.touched.place(means, nodes, free, Some(q))?;
+                    self.touched.place(means, nodes, &self.free, Some(q))?;
                     if !(self.touched).has_lost(&mut self.problem, rest, last) {
                         return Ok(pushed);
                     }
@@ -332,17 +340,9 @@ impl Between {
         };
         self.shown = Some(place);
         if solves.stays(place) {
-            let free = self.free.as_chunks_mut::<3>().0;
-            for &node in self
-                .problem
-                .surface
-                .samples
-                .nodes()
-                .iter()
-                .chain(view.region)
-            {
-                free[node as usize] = last.as_chunks::<3>().0[node as usize];
-            }
+            let nodes = self.problem.surface.samples.nodes().iter();
+            let nodes = nodes.chain(view.region);
+            self.led.stay(groups, nodes, last, &mut self.free);
         }
         let moves = solves.moves(place);
         if let Some(q) = moves {

@@ -91,6 +91,20 @@ impl LedGroups {
         }
     }
 
+    /// Tissue that stays at these nodes where the step left it, `last [K,3]`, and goes with the groups alone, into `free`.
+    pub fn stay<'a>(
+        &self,
+        groups: &[Group],
+        nodes: impl IntoIterator<Item = &'a u32>,
+        last: &[f32],
+        free: &mut [f32],
+    ) {
+        let (last, free) = (last.as_chunks::<3>().0, free.as_chunks_mut::<3>().0);
+        for &node in nodes {
+            free[node as usize] = self.moved(groups, node, last[node as usize]);
+        }
+    }
+
     /// All of it that a contact solve depends on.
     pub fn key(&self) -> &[(u32, [f32; 3])] {
         &self.places
