@@ -130,6 +130,23 @@ fn a_region_that_is_the_whole_body_has_the_bits_of_the_materials_law() {
     }
 }
 
+/// A density of a region is in the masses of a step as the material's own is.
+#[test]
+fn a_region_that_is_the_whole_body_has_the_bits_of_the_materials_density() {
+    let [own, marked, plain] = [liver(), liver(), liver()];
+    let density = 1300.0;
+    let mut manifest = fixture::manifest(own.path());
+    manifest["material"]["density_kg_m3"] = density.into();
+    fixture::write_manifest(own.path(), &mut manifest);
+    let law = json!({"name": "neo-hookean"});
+    let laws = json!([{"name": "lobe", "law": law, "density_kg_m3": density}]);
+    mark(marked.path(), |_| 1, &laws, &laws);
+    let whole = play(own.path());
+    assert_eq!(play(marked.path()), whole);
+    let heavier = fixture::largest_difference(&whole[3], &play(plain.path())[3]);
+    assert!(heavier > 1e-3, "{heavier} mm");
+}
+
 #[test]
 fn laws_that_cannot_be_are_named_with_their_region() {
     let refused = |number: i32, laws: &Value, named: &Value, words: &[&str]| {
