@@ -89,7 +89,9 @@ pub fn source_of(law: &Law) -> String {
 /// A law by its formula, by the name of a tissue or as a manifest has it; what clap calls for `--law`.
 pub fn law(text: &str) -> Result<Law, String> {
     if text.starts_with('{') {
-        return serde_json::from_str(text).map_err(|error| format!("`{text}`: {error}"));
+        let law: Law = serde_json::from_str(text).map_err(|error| format!("`{text}`: {error}"))?;
+        // Its formula is checked as one that is typed.
+        return law.to_string().parse();
     }
     match tissues().into_iter().find(|tissue| tissue.name == text) {
         Some(tissue) => tissue.law.parse(),
@@ -183,6 +185,8 @@ mod tests {
     #[test]
     fn a_name_that_is_none_leads_to_the_list() {
         assert!(law("spleen").unwrap_err().contains("upt materials"));
+        // Falls with stretch.
+        assert!(law(r#"{"name":"yeoh","c2_over_c1":-1.0,"c3_over_c1":0.0}"#).is_err());
         assert!(!law("ogden:1,2,3").unwrap_err().contains("upt materials"));
     }
 }

@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Parser;
 use foreign::python;
+use sha2::{Digest, Sha256};
 use yardstick::bundle_folder::BundleFolder;
 
-use crate::make;
+use crate::{make, materials};
 
 /// Regions and their tissues, as `upt make` takes them; the tissue of what is left comes first.
 const REST: &str = "corona-radiata";
@@ -48,6 +49,21 @@ fn order(mesh: &Path, out: &Path, nodes: usize) -> Result<make::Options> {
     Ok(Line::try_parse_from(words)?.make)
 }
 
+/// Its folder's name, which is another one where mesh, tissues, regions or version are: an older bundle is never taken for what is asked for.
+fn kept_as(mesh_sha256: &str) -> Result<String> {
+    let mut hash = Sha256::new();
+    hash.update(mesh_sha256);
+    hash.update(env!("CARGO_PKG_VERSION"));
+    for name in REGIONS.iter().map(|[name, _]| *name).chain([REST]) {
+        let law = materials::law(name).map_err(anyhow::Error::msg)?;
+        hash.update(format!("{name} {law}"));
+    }
+    hash.update(format!("{REGIONS:?} {MINUTES} {NODES_A_MINUTE}"));
+    let digest = hash.finalize();
+    let short: String = digest[..4].iter().map(|b| format!("{b:02x}")).collect();
+    Ok(format!("brain-measured-{short}"))
+}
+
 /// The folder of a brain's bundle of measured tissue; made where there is none yet.
 pub fn folder(bundle: &Path) -> Result<PathBuf> {
     let own = BundleFolder::read(bundle)?;
@@ -58,8 +74,7 @@ pub fn folder(bundle: &Path) -> Result<PathBuf> {
             own.name
         );
     }
-    let short = own.mesh_sha256.get(..8).unwrap_or_default();
-    let out = (python::cache()?.join("bundles")).join(format!("brain-measured-{short}"));
+    let out = (python::cache()?.join("bundles")).join(kept_as(&own.mesh_sha256)?);
     if out.join("bundle.json").is_file() {
         return Ok(out);
     }
@@ -89,8 +104,7 @@ pub fn folder(bundle: &Path) -> Result<PathBuf> {
 mod tests {
     use std::path::Path;
 
-    use super::{REGIONS, folder, order};
-    use crate::materials;
+    use super::{REGIONS, folder, kept_as, materials, order};
 
     #[test]
     fn every_region_is_a_tissue_that_was_measured() {
@@ -101,6 +115,12 @@ mod tests {
             assert!(!materials::source_of(&materials::law(name).unwrap()).is_empty());
         }
         assert!(!materials::source_of(&materials::law(super::REST).unwrap()).is_empty());
+    }
+
+    #[test]
+    fn another_mesh_is_another_bundle() {
+        assert_eq!(kept_as("a").unwrap(), kept_as("a").unwrap());
+        assert_ne!(kept_as("a").unwrap(), kept_as("b").unwrap());
     }
 
     #[test]
