@@ -50,8 +50,10 @@ pub(in crate::corrections) struct NearFactor {
     factor: SparseFactor,
     /// Where the core's nodes are at rest.
     points: Vec<[f32; 3]>,
-    /// Columns of each row with those that come twice, while the pattern is made.
+    /// Of each row: the elements at its node, each as four times its index and the node's corner in it.
     entries: Vec<u32>,
+    /// By free place: where the entry of that column is, while a row is made.
+    entry_of: Vec<u32>,
     /// Factors made so far, for what is kept of one.
     pub generation: u64,
 }
@@ -105,27 +107,16 @@ impl NearFactor {
         let nodes = near.nodes[..core].iter().map(|node| 3 * *node as usize);
         self.points
             .extend(nodes.map(|at| [rest[at], rest[at + 1], rest[at + 2]]));
+        self.targets.clear();
+        memory::fit(&mut self.targets, elements.len(), WHAT)?;
+        self.targets.resize(elements.len(), [NONE; 16]);
         self.fill_rows(near)?;
         let rows = &mut self.rows;
         rows.blocks.resize(rows.columns.len(), [0.0; 9]);
-        self.targets.clear();
-        memory::fit(&mut self.targets, elements.len(), WHAT)?;
-        for places in elements.places() {
-            let mut targets = [NONE; 16];
-            for (at, target) in targets.iter_mut().enumerate() {
-                let (row, column) = (places[at / 4] as usize, places[at % 4]);
-                if row < core
-                    && let Some(found) = rows.position(row, column)
-                {
-                    *target = found as u32;
-                }
-            }
-            self.targets.push(targets);
-        }
         self.factor.plan(&self.rows, &self.points)
     }
 
-    /// Which nodes share an element with each of the core.
+    /// Which nodes share an element with each of the core, and where the blocks of each element go.
     fn fill_rows(&mut self, near: &NearSet) -> Result<()> {
         let (rows, core) = (&mut self.rows, near.core);
         let is_core = |place: &u32| (*place as usize) < core;
@@ -133,7 +124,7 @@ impl NearFactor {
         memory::fit(&mut rows.starts, core + 1, WHAT)?;
         rows.starts.resize(core + 1, 0);
         for row in near.elements.places().flatten().filter(is_core) {
-            rows.starts[row as usize + 1] += 4;
+            rows.starts[row as usize + 1] += 1;
         }
         for row in 0..core {
             rows.starts[row + 1] += rows.starts[row];
@@ -142,28 +133,52 @@ impl NearFactor {
         self.entries.clear();
         memory::fit(&mut self.entries, most, WHAT)?;
         self.entries.resize(most, NONE);
-        for places in near.elements.places() {
-            for row in places.into_iter().filter(is_core) {
+        for (places, element) in near.elements.places().zip(0u32..) {
+            let corners = places.into_iter().zip(0..);
+            for (row, corner) in corners.filter(|(row, _)| is_core(row)) {
                 // The start of a row moves to that of the next while it is filled.
                 let at = &mut rows.starts[row as usize];
-                self.entries[*at as usize..][..4].copy_from_slice(&places);
-                *at += 4;
+                self.entries[*at as usize] = 4 * element + corner;
+                *at += 1;
             }
         }
         rows.columns.clear();
-        memory::fit(&mut rows.columns, most, WHAT)?;
+        memory::fit(&mut rows.columns, 4 * most, WHAT)?;
+        let entry_of = &mut self.entry_of;
+        entry_of.clear();
+        memory::fit(entry_of, near.free, WHAT)?;
+        entry_of.resize(near.free, NONE);
         let mut start = 0;
         for row in 0..core {
             let end = rows.starts[row] as usize;
-            let own = &mut self.entries[start..end];
-            own.sort_unstable();
-            rows.starts[row] = rows.columns.len() as u32;
-            let mut last = NONE;
-            for &column in own.iter().filter(|column| (**column as usize) < near.free) {
-                if column != last {
-                    rows.columns.push(column);
-                    last = column;
+            let own = &self.entries[start..end];
+            let first = rows.columns.len();
+            rows.starts[row] = first as u32;
+            for entry in own {
+                for column in near.elements.places_of(*entry as usize / 4) {
+                    if let Some(at) = entry_of.get_mut(column as usize)
+                        && *at == NONE
+                    {
+                        *at = 0;
+                        rows.columns.push(column);
+                    }
                 }
+            }
+            let columns = &mut rows.columns[first..];
+            columns.sort_unstable();
+            for (at, &column) in columns.iter().enumerate() {
+                entry_of[column as usize] = (first + at) as u32;
+            }
+            for entry in own {
+                let (element, corner) = (*entry as usize / 4, *entry as usize % 4);
+                let places = near.elements.places_of(element);
+                let targets = &mut self.targets[element][4 * corner..][..4];
+                for (target, column) in targets.iter_mut().zip(places) {
+                    *target = entry_of.get(column as usize).copied().unwrap_or(NONE);
+                }
+            }
+            for &column in columns.iter() {
+                entry_of[column as usize] = NONE;
             }
             start = end;
         }

@@ -32,7 +32,7 @@ impl LocalSolver {
         // What of the change along the direction is linear is computed once here; each part `t` of it then costs the near elements alone.
         let stiff = &mut self.d.stiff;
         step.preconditioner.stiffen(env, &self.d.step.c, stiff)?;
-        self.near.linear(env, &self.d.modes, &mut self.d.linear);
+        (self.near).linear(env, &self.d.modes, None, &mut self.d.linear);
         self.measure_direction(env);
         // Along a line the loads do not change, so their work is a constant of the slopes.
         let work = self.work(problem);

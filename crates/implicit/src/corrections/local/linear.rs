@@ -64,6 +64,21 @@ impl LinearElements {
         self.0.iter().map(|element| element.places)
     }
 
+    /// The same of one element.
+    pub fn places_of(&self, at: usize) -> [u32; 4] {
+        self.0[at].places
+    }
+
+    /// Those elements that have a corner at one of the first places that is asked for, ascending.
+    pub fn find(&self, is_asked: &[bool], found: &mut Vec<u32>) -> Result<()> {
+        found.clear();
+        memory::fit(found, self.len(), WHAT)?;
+        let asks = |place: &u32| is_asked.get(*place as usize) == Some(&true);
+        let all = self.places().zip(0..);
+        found.extend(all.filter_map(|(places, at)| places.iter().any(asks).then_some(at)));
+        Ok(())
+    }
+
     /// An element, its corners as places, and its moduli.
     pub fn tetrahedron(&self, at: usize, far: &FarField) -> (Tetrahedron, Moduli) {
         let element = &self.0[at];
@@ -92,49 +107,58 @@ impl LinearElements {
             .fold(0.0, |most, x| most.max(x.abs()))
     }
 
-    /// `K v` at the first places, as many as `out [.., 3]` has, µN, of a field `[.., 3]` by place, mm.
-    pub fn apply(&self, v: &[f32], out: &mut [f32]) {
+    /// `K v` at the first places, as many as `out [.., 3]` has, µN, of a field `[.., 3]` by place, mm; where there are `some`, by those elements
+    /// alone.
+    pub fn apply(&self, v: &[f32], some: Option<&[u32]>, out: &mut [f32]) {
         out.fill(0.0);
-        let v = v.as_chunks::<3>().0;
-        let out = out.as_chunks_mut::<3>().0;
-        for element in &self.0 {
-            let [first, rest @ ..] = element.places.map(|place| v[place as usize]);
-            let mut h = [[0.0f32; 3]; 3];
-            for (corner, gradient) in rest.iter().zip(&element.gradients) {
-                for i in 0..3 {
-                    let relative = corner[i] - first[i];
-                    for j in 0..3 {
-                        h[i][j] += relative * gradient[j];
-                    }
-                }
-            }
-            let pressure = element.lambda * (h[0][0] + h[1][1] + h[2][2]);
-            let mut stress = [[0.0f32; 3]; 3];
+        match some {
+            Some(some) => apply(some.iter().map(|at| &self.0[*at as usize]), v, out),
+            None => apply(self.0.iter(), v, out),
+        }
+    }
+}
+
+/// Adds `K v` of some elements.
+fn apply<'a>(elements: impl Iterator<Item = &'a Linear>, v: &[f32], out: &mut [f32]) {
+    let v = v.as_chunks::<3>().0;
+    let out = out.as_chunks_mut::<3>().0;
+    for element in elements {
+        let [first, rest @ ..] = element.places.map(|place| v[place as usize]);
+        let mut h = [[0.0f32; 3]; 3];
+        for (corner, gradient) in rest.iter().zip(&element.gradients) {
             for i in 0..3 {
+                let relative = corner[i] - first[i];
                 for j in 0..3 {
-                    stress[i][j] = element.shear * (h[i][j] + h[j][i]);
-                }
-                stress[i][i] += pressure;
-            }
-            let mut balance = [0.0f32; 3];
-            for (&place, gradient) in element.places[1..].iter().zip(&element.gradients) {
-                let mut force = [0.0f32; 3];
-                for i in 0..3 {
-                    force[i] = stress[i][0] * gradient[0]
-                        + stress[i][1] * gradient[1]
-                        + stress[i][2] * gradient[2];
-                    balance[i] -= force[i];
-                }
-                if let Some(out) = out.get_mut(place as usize) {
-                    for (out, force) in out.iter_mut().zip(force) {
-                        *out += force;
-                    }
+                    h[i][j] += relative * gradient[j];
                 }
             }
-            if let Some(out) = out.get_mut(element.places[0] as usize) {
-                for (out, force) in out.iter_mut().zip(balance) {
+        }
+        let pressure = element.lambda * (h[0][0] + h[1][1] + h[2][2]);
+        let mut stress = [[0.0f32; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                stress[i][j] = element.shear * (h[i][j] + h[j][i]);
+            }
+            stress[i][i] += pressure;
+        }
+        let mut balance = [0.0f32; 3];
+        for (&place, gradient) in element.places[1..].iter().zip(&element.gradients) {
+            let mut force = [0.0f32; 3];
+            for i in 0..3 {
+                force[i] = stress[i][0] * gradient[0]
+                    + stress[i][1] * gradient[1]
+                    + stress[i][2] * gradient[2];
+                balance[i] -= force[i];
+            }
+            if let Some(out) = out.get_mut(place as usize) {
+                for (out, force) in out.iter_mut().zip(force) {
                     *out += force;
                 }
+            }
+        }
+        if let Some(out) = out.get_mut(element.places[0] as usize) {
+            for (out, force) in out.iter_mut().zip(balance) {
+                *out += force;
             }
         }
     }
@@ -148,6 +172,8 @@ pub(super) struct Parts {
     /// `sum_e v_e grad N` of their free nodes, by place, mm².
     weights: Vec<(u32, [f32; 3])>,
     sums: Vec<[f32; 3]>,
+    /// Places that a sum has been added to, a bit each.
+    summed: Vec<u64>,
     /// Elements by cluster, and where each cluster's end.
     order: Vec<u32>,
     ends: Vec<u32>,
@@ -172,6 +198,9 @@ impl Parts {
         self.sums.clear();
         memory::fit(&mut self.sums, free, WHAT)?;
         self.sums.resize(free, [0.0; 3]);
+        self.summed.clear();
+        memory::fit(&mut self.summed, free.div_ceil(64), WHAT)?;
+        self.summed.resize(free.div_ceil(64), 0);
         self.sort(elements, far.clusters())?;
         for cluster in 0..far.clusters() {
             let start = cluster.checked_sub(1).map_or(0, |before| self.ends[before]);
@@ -184,6 +213,7 @@ impl Parts {
                 let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
                 for (place, gradient) in element.places.into_iter().zip([first, a, b, c]) {
                     if let Some(sum) = self.sums.get_mut(place as usize) {
+                        self.summed[place as usize / 64] |= 1 << (place % 64);
                         for (sum, value) in sum.iter_mut().zip(gradient) {
                             *sum += share * value;
                             largest = largest.max((share * value).abs());
@@ -195,12 +225,17 @@ impl Parts {
                 continue;
             }
             let start = self.weights.len();
-            for (place, sum) in self.sums.iter_mut().enumerate() {
-                // Inside of the part the shares of a node's elements cancel.
-                if sum.iter().any(|value| value.abs() > 1e-5 * largest) {
-                    memory::push(&mut self.weights, (place as u32, *sum), WHAT)?;
+            // A part has few of the places: the others are passed by, sixty-four at a time.
+            for (word, bits) in self.summed.iter_mut().enumerate() {
+                while *bits != 0 {
+                    let place = 64 * word + bits.trailing_zeros() as usize;
+                    *bits &= *bits - 1;
+                    let sum = std::mem::take(&mut self.sums[place]);
+                    // Inside of the part the shares of a node's elements cancel.
+                    if sum.iter().any(|value| value.abs() > 1e-5 * largest) {
+                        memory::push(&mut self.weights, (place as u32, sum), WHAT)?;
+                    }
                 }
-                *sum = [0.0; 3];
             }
             let part = Part {
                 cluster,

@@ -65,8 +65,8 @@ pub(in crate::corrections) struct NearSet {
     /// Of the near nodes from the nearest centre, squared, mm².
     distances: Vec<f32>,
     subset: Subset,
-    /// Numbers of the near elements in the mesh, ascending.
-    numbers: Vec<u32>,
+    /// By number in the mesh.
+    is_near: Vec<bool>,
     pub(super) elements: LinearElements,
     /// What of the far field's clusters is near.
     pub(super) parts: Parts,
@@ -95,7 +95,7 @@ impl NearSet {
             counts: memory::filled(count, 0, WHAT)?,
             distances: Vec::new(),
             subset: memory::tried(Subset::new(&env.body.forces), WHAT)?,
-            numbers: Vec::new(),
+            is_near: Vec::new(),
             elements: LinearElements::default(),
             parts: Parts::default(),
             plan: RowPlan::try_region(&env.prior.basis(), &[], true)?,
@@ -255,7 +255,9 @@ impl NearSet {
         self.counts.fill(0);
         self.nodes.clear();
         self.elements.clear();
-        self.numbers.clear();
+        self.is_near.clear();
+        memory::fit(&mut self.is_near, far.cluster_of.len(), WHAT)?;
+        self.is_near.resize(far.cluster_of.len(), false);
         self.subset.clear();
         let forces = &env.body.forces;
         let is_reached = |node: u32| is_by(rest, &self.chosen, node, reach);
@@ -299,10 +301,9 @@ impl NearSet {
                 }
                 *count += 1;
             }
-            memory::push(&mut self.numbers, number, WHAT)?;
+            self.is_near[number as usize] = true;
             self.elements.push(far, number, &element)?;
         }
-        self.numbers.sort_unstable();
         Ok(())
     }
 
@@ -310,7 +311,7 @@ impl NearSet {
     pub fn far_det(&self, forces: &ElementForces, chunk: usize, u: &[f32]) -> f32 {
         let nodes = forces.chunk_nodes(chunk);
         let elements = forces.chunk_tetrahedra(chunk);
-        let far = elements.filter(|(number, _)| self.numbers.binary_search(number).is_err());
+        let far = elements.filter(|(number, _)| !self.is_near[*number as usize]);
         let dets = far.map(|(_, element)| {
             let corners = element.corners.map(|corner| nodes[corner as usize]);
             let u = corners.map(|node| [0, 1, 2].map(|k| f64::from(u[3 * node as usize + k])));
@@ -332,10 +333,10 @@ impl NearSet {
         })
     }
 
-    /// `(K + kappa M) v` of the near elements at the free nodes, `[3 free]`, µN, of a field `[.., 3]` by place; without inertia at those that
-    /// are not inside.
-    pub fn linear(&self, env: Env<'_>, v: &[f32], out: &mut [f32]) {
-        self.elements.apply(v, out);
+    /// `(K + kappa M) v` of the near elements, or of some, at the free nodes, `[3 free]`, µN, of a field `[.., 3]` by place; without inertia at
+    /// those that are not inside.
+    pub fn linear(&self, env: Env<'_>, v: &[f32], some: Option<&[u32]>, out: &mut [f32]) {
+        self.elements.apply(v, some, out);
         let kappa = env.time_step.integrator.kappa() as f32;
         let rows = out.as_chunks_mut::<3>().0.iter_mut();
         let inside = self.nodes[..self.inside].iter();

@@ -113,11 +113,11 @@ impl Pairs {
 
     /// Lays out all pairs for a near set.
     pub fn lay_out(&mut self, env: Env<'_>, near: &NearSet, room: &mut Room) -> Result<()> {
-        let mut is_new = false;
+        let (mut is_new, mut listed) = (false, None);
         for at in 0..self.order.len() {
             let slot = self.order[at];
             if !self.laid_out[slot] {
-                self.lay_out_one(env, near, room, slot)?;
+                self.lay_out_one(env, near, room, (slot, &mut listed))?;
                 is_new = true;
             }
         }
@@ -132,12 +132,13 @@ impl Pairs {
         Ok(())
     }
 
+    /// The pair of a slot. `listed` is that of which `room` knows the elements at nodes that it does not know.
     fn lay_out_one(
         &mut self,
         env: Env<'_>,
         near: &NearSet,
         room: &mut Room,
-        slot: usize,
+        (slot, listed): (usize, &mut Option<usize>),
     ) -> Result<()> {
         let (record, step) = (&self.records[slot], &mut self.steps[slot]);
         let change = &mut self.changes[slot];
@@ -162,13 +163,20 @@ impl Pairs {
                 }
             };
             kept(&record.t, &mut step.t);
-            // Where it was far it was linear.
+            // Where it was far it was linear. A set that moves on has few such nodes, and the pairs have them in common.
+            let is_listed =
+                listed.is_some_and(|other: usize| self.records[other].nodes == record.nodes);
+            if !is_listed {
+                *listed = None;
+                room.find_unknown(near, &record.nodes)?;
+                *listed = Some(slot);
+            }
             resize(&mut room.field, 3 * near.nodes.len())?;
             resize(&mut room.linear, 3 * near.free)?;
             env.near_coordinates(&step.c, &near.ranges, &mut room.q);
             near.decode(env, &room.q, &mut room.field)?;
             add(1.0, &step.t, &mut room.field);
-            near.linear(env, &room.field, &mut room.linear);
+            near.linear(env, &room.field, Some(&room.found), &mut room.linear);
             change.r.copy_from_slice(&room.linear[..3 * near.inside]);
             // Where the pair knows the nonlinear change it takes the place of the linear one.
             kept(&record.r, &mut change.r);
@@ -204,7 +212,7 @@ impl Pairs {
         self.laid_out[slot] = false;
         // The slot is in no list until the pair is whole: what fails below loses this pair and nothing else.
         self.records[slot].fill(near, about, step, change)?;
-        self.lay_out_one(env, near, room, slot)?;
+        self.lay_out_one(env, near, room, (slot, &mut None))?;
         self.order.push(slot);
         self.multiply(self.order.len() - 1);
         if self.products[slot][slot] <= 0.0 {
@@ -299,9 +307,24 @@ pub(in crate::corrections) struct Room {
     pub linear: Vec<f32>,
     /// Those of the near blocks in which some coordinates are not all zero.
     pub used: Vec<Range<usize>>,
+    /// By inside place: whether a pair does not know it; and the elements at those.
+    pub unknown: Vec<bool>,
+    pub found: Vec<u32>,
 }
 
 impl Room {
+    /// Lists the elements at those inside nodes that are not among the known ones.
+    fn find_unknown(&mut self, near: &NearSet, known: &[u32]) -> Result<()> {
+        self.unknown.clear();
+        memory::fit(&mut self.unknown, near.inside, WHAT)?;
+        self.unknown.resize(near.inside, true);
+        let places = known.iter().filter_map(|node| near.place(*node));
+        for place in places.filter(|place| *place < near.inside) {
+            self.unknown[place] = false;
+        }
+        near.elements.find(&self.unknown, &mut self.found)
+    }
+
     /// `linear [n,r] = Phi^T field` of up to three fields `[n, 3 free]`.
     pub fn on_modes(&mut self, env: Env<'_>, near: &NearSet, count: usize) -> Result<()> {
         let size = self.q.len();

@@ -152,7 +152,7 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     local.decode_direction(&mut step).unwrap();
     let stiff = &mut local.d.stiff;
     step.preconditioner.stiffen(env, &c, stiff).unwrap();
-    local.near.linear(env, &local.d.modes, &mut local.d.linear);
+    (local.near).linear(env, &local.d.modes, None, &mut local.d.linear);
     local.place_at(&u, 1.0);
     local.evaluate(&mut step, 1.0).unwrap();
     let found = local.residuals.next.p.clone();
