@@ -8,7 +8,7 @@ use super::loads::{Acting, Loads, WHAT};
 use super::supports::{self, GroupState};
 use std::sync::Arc;
 
-use crate::corrections::{Corrections, Held, ImplicitSolver, Load, SolverContext, TimeStep};
+use crate::corrections::{Corrections, Held, Load, SolverContext, TimeStep, let_go};
 use crate::error::{Error, Result};
 use crate::kernels::Machine;
 use crate::memory::{self, HeldBytes};
@@ -72,7 +72,7 @@ impl SceneLoads {
         let held = state.and_then(|loads| loads.held.as_deref_mut());
         match (held, at_rest(&body.model, machine)?) {
             (Some(held), Some(context)) if held.let_go != 0 && !held.modes.is_made() => {
-                ImplicitSolver::let_go(context, &body.mesh.positions, held)
+                let_go(context, &body.mesh.positions, held)
             }
             _ => Ok(()),
         }

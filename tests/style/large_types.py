@@ -39,7 +39,6 @@ LARGER: dict[str, tuple[int, int]] = {
     "implicit::ColumnCompliance": (11, 9),
     "implicit::Delassus": (11, 6),
     "implicit::FarField": (13, 11),
-    "implicit::ImplicitSolver": (10, 58),
     "implicit::NearSet": (19, 17),
     "implicit::Report": (11, 1),
     "implicit::Substeps": (11, 2),

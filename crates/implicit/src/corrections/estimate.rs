@@ -5,10 +5,7 @@
 //! REQ-037: The estimated error of a step falls as its residual does, and above the host's limit a flag says so.
 
 use super::input::{Enough, Report};
-use super::passes;
-use super::precondition::Env;
-use super::solver::ImplicitSolver;
-use crate::error::Result;
+use super::motion::Motion;
 
 /// Part of a state's error that the next one keeps.
 const KEPT: f32 = 0.7;
@@ -17,39 +14,28 @@ const FAR_ERROR: f32 = 150.0;
 /// Iterations that a target does not end: what the first one moves says little of what the next would.
 const LEAST: u32 = 2;
 
-impl ImplicitSolver {
-    /// The estimated error of the state being made: what further iterations would move, what a step of this length leaves out, and
+impl Motion {
+    /// The estimated error of this state, the one being made after `last`: what further iterations would move, what a step of this length leaves out, and
     /// what is left of the error of the state before, from which this one started.
-    pub(super) fn estimate(&mut self, report: &mut Report) {
+    pub(super) fn estimate(&mut self, last: &Motion, report: &mut Report) {
         let far = FAR_ERROR * report.far_mm;
-        let own = libm::hypotf(
-            libm::hypotf(report.remaining_mm, far),
-            self.next.truncated_mm,
-        );
-        report.error_mm = libm::hypotf(own, KEPT * self.motion.error_mm);
+        let own = libm::hypotf(libm::hypotf(report.remaining_mm, far), self.truncated_mm);
+        report.error_mm = libm::hypotf(own, KEPT * last.error_mm);
         // What no number describes is told once, and not remembered.
-        self.next.error_mm = match report.error_mm.is_finite() {
+        self.error_mm = match report.error_mm.is_finite() {
             true => report.error_mm,
             false => 0.0,
         };
     }
 
-    /// Whether `iterations` have corrected a step enough: the error is as small as was asked, or further iterations could not make it smaller, by
+    /// Whether `iterations` have corrected the step after this state enough: the error is as small as was asked, or further iterations could not make it smaller, by
     /// what the last step left and left out.
     pub(super) fn suffices(&self, iterations: u32, remaining_mm: f32, enough: Enough) -> bool {
-        let rest = libm::hypotf(self.motion.truncated_mm, KEPT * self.motion.error_mm);
+        let rest = libm::hypotf(self.truncated_mm, KEPT * self.error_mm);
         let wanted = enough.error_mm;
         wanted > 0.0
             && iterations >= LEAST
             && (libm::hypotf(remaining_mm, rest) < wanted
                 || (rest >= wanted && remaining_mm < 0.1 * rest))
-    }
-
-    /// What a further iteration would move, from the last one's step and by how much it lessened the residual, mm.
-    pub(super) fn remaining(&mut self, env: Env<'_>, g: &[f32], before: f64) -> Result<f32> {
-        let moved = passes::square(env, &self.fields.d, &mut self.balance.partial)?
-            / (self.fields.d.len() / 3) as f64;
-        let left = self.balance.size(env, g)? / before.max(f64::MIN_POSITIVE);
-        Ok((moved.sqrt() * left) as f32)
     }
 }

@@ -3,200 +3,204 @@
 //!
 //! The oscillators and the forces that make BDF2 follow them are in [`super::oscillators`].
 
-use super::input::{Input, Report, SolverContext};
+use super::gravity_columns::add_gravity;
+use super::input::Report;
+use super::lift::lift;
 use super::passes;
 use super::precondition::mask_held;
+use super::relax::FieldStep;
 use super::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 
 /// What of the last field stays in a step where no free motion was found.
 const KEPT: f32 = 0.8;
 
-impl ImplicitSolver {
+impl FieldStep<'_> {
     /// Makes the free step from `input.last` in one.
-    pub(super) fn swing_once(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        next: &mut [f32],
-    ) -> Result<Report> {
-        let mut report = Report::default();
+    pub(super) fn swing_once(&mut self, next: &mut [f32]) -> Result<Report> {
+        let (context, input) = (self.context, self.input);
         let rests = |field: &[f32]| field.iter().all(|value| *value == 0.0);
         // Tissue that relaxes goes on to creep where it has been strained, without any load.
-        let pushes = self.relaxing.as_ref().is_some_and(|own| !own.rests());
+        let pushes = self
+            .solver
+            .relaxing
+            .as_ref()
+            .is_some_and(|own| !own.rests());
         // A body at rest that nothing pushes stays there, and costs nothing.
         let is_free = input.load.is_none() && !pushes;
         if is_free && rests(input.last) && rests(input.before) && (input.still || self.rests()) {
             next.fill(0.0);
-            self.balance.load.clear();
-            self.finish(context, input, next)?;
-            report.min_det = 1.0;
-            return Ok(report);
+            self.solver.balance.load.clear();
+            self.solver.finish(context, input, next)?;
+            self.report.min_det = 1.0;
+            return Ok(self.report);
         }
         let _awake = context.pool.keep_awake();
-        self.balance.nodes.clear();
-        self.preconditioner.prescribe(context.env(), &[])?;
-        self.expect(context, input)?;
+        self.solver.balance.nodes.clear();
+        self.solver.preconditioner.prescribe(context.env(), &[])?;
+        self.solver.expect(context, input)?;
         // Nothing is prescribed: the pairs of the whole body hold.
-        self.memory.mask(&[]);
-        self.prepare(context, input)?;
-        let mut u = std::mem::take(&mut self.fields.u);
-        let mut g = std::mem::take(&mut self.fields.g);
+        self.solver.memory.mask(&[]);
+        self.solver.prepare(context, input)?;
+        let mut u = std::mem::take(&mut self.solver.fields.u);
+        let mut g = std::mem::take(&mut self.solver.fields.g);
         // A body of which a part has been let go has other natural modes.
         let swings = context.held.let_go == 0;
         let result = match swings {
-            true => self.swing_from(context, input, &mut u, &mut g, &mut report),
-            false => self.balance_from(context, input, &mut u, &mut g, &mut report),
+            true => self.swing_from(&mut u, &mut g),
+            false => self.balance_from(&mut u, &mut g),
         };
-        let result = result.and_then(|()| self.finish(context, input, &u));
+        let result = result.and_then(|()| self.solver.finish(context, input, &u));
         if result.is_ok() {
             next.copy_from_slice(&u);
             if swings {
-                self.finish_free(context, input.last, next);
+                self.finish_free(next);
             }
-            if report.fell_back {
-                self.stop_next();
-                self.leave_load()?;
+            if self.report.fell_back {
+                self.solver.stop_next();
+                self.solver.next.leave_load(&self.solver.balance.load)?;
             }
-            self.next.min_det = report.min_det;
-            self.estimate(&mut report);
+            self.solver.next.min_det = self.report.min_det;
+            (self.solver.next).estimate(&self.solver.motion, &mut self.report);
         }
-        (self.fields.u, self.fields.g) = (u, g);
-        result.map(|()| report)
+        (self.solver.fields.u, self.solver.fields.g) = (u, g);
+        result.map(|()| self.report)
     }
 
     /// Whether nothing moved in the last two steps: to the bit, for what moves by the least goes on moving.
     fn rests(&self) -> bool {
-        let fields = [&self.motion.velocity, &self.motion.velocity_before];
+        let fields = [
+            &self.solver.motion.velocity,
+            &self.solver.motion.velocity_before,
+        ];
         fields.iter().all(|field| field.iter().all(|v| *v == 0.0))
     }
 
     /// BDF2 about the free swing of the natural modes: the modes' error under BDF2 is taken off before the iterations, which then have the rest of the field and the
     /// law's nonlinearity to balance.
-    fn swing_from(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        u: &mut [f32],
-        g: &mut [f32],
-        report: &mut Report,
-    ) -> Result<()> {
+    fn swing_from(&mut self, u: &mut [f32], g: &mut [f32]) -> Result<()> {
+        let (context, input) = (self.context, self.input);
         let (h, kappa) = (
             context.time_step.integrator.step_s,
             context.time_step.integrator.kappa(),
         );
         // Each natural mode is an oscillator `y'' + alpha y' + w² y = f`, solved over the step in closed form: BDF2 would damp it, the more the longer the step.
-        self.free.ready(context)?;
+        self.solver.free.ready(context)?;
         let still = input.last;
         // Internal forces of the last state: what the modes swing about is not linear elasticity but the law.
-        let (det, _) = self
-            .balance
-            .residual(context, [still, still, still], g, report)?;
+        let (det, _) =
+            self.solver
+                .balance
+                .residual(context, [still, still, still], g, &mut self.report)?;
         // Amplitudes and rates of the modes at the start of the step, and what the law's forces have of each.
-        self.measure(context, input, g)?;
+        self.measure(g)?;
         let env = context.env();
         // What the modes lack under BDF2 goes into the inertia of the step, ...
-        self.free.give(|mode| mode.forced(h, kappa));
-        self.preconditioner
-            .of_natural(env, &self.free.values, &mut self.fields.d)?;
+        self.solver.free.give(|mode| mode.forced(h, kappa));
+        self.solver.preconditioner.of_natural(
+            env,
+            &self.solver.free.values,
+            &mut self.solver.fields.d,
+        )?;
         let masses = &env.body.mass;
         for (i, (drift, forced)) in self
+            .solver
             .balance
             .drift
             .iter_mut()
-            .zip(&self.fields.d)
+            .zip(&self.solver.fields.d)
             .enumerate()
         {
             *drift -= masses[i / 3] * forced;
         }
         // ... and into the velocities at its end.
-        self.free.give(|mode| mode.faster(h));
-        self.preconditioner
-            .of_natural(env, &self.free.values, &mut self.free.faster)?;
+        self.solver.free.give(|mode| mode.faster(h));
+        self.solver.preconditioner.of_natural(
+            env,
+            &self.solver.free.values,
+            &mut self.solver.free.faster,
+        )?;
         // Where the oscillators are at the end of the step, less where they were.
-        self.free.give(|mode| mode.after(h).0 - mode.place);
-        self.preconditioner
-            .of_natural(env, &self.free.values, &mut self.fields.d)?;
+        self.solver.free.give(|mode| mode.after(h).0 - mode.place);
+        self.solver.preconditioner.of_natural(
+            env,
+            &self.solver.free.values,
+            &mut self.solver.fields.d,
+        )?;
         // The guess: the last state moved along the modes as their oscillators do.
-        passes::shorten(env, input.last, &self.fields.d, 1.0, u)?;
-        self.add_gravity(context, input, u)?;
-        self.lift(context, input, Some(input.last), u)?;
+        passes::shorten(env, input.last, &self.solver.fields.d, 1.0, u)?;
+        add_gravity(context, input, u)?;
+        lift(context, input, Some(input.last), u)?;
         // A guess that inverts elements where the last state did not is given up for the last state.
         let lost = det.is_nan() || det < SMALLEST_DET;
         let mut det = self
+            .solver
             .balance
-            .residual(context, [input.last, u, u], g, report)?
+            .residual(context, [input.last, u, u], g, &mut self.report)?
             .0;
         if !lost && (det.is_nan() || det < SMALLEST_DET) {
             u.copy_from_slice(input.last);
             det = self
+                .solver
                 .balance
-                .residual(context, [input.last, u, u], g, report)?
+                .residual(context, [input.last, u, u], g, &mut self.report)?
                 .0;
         }
-        report.parts = 1;
-        self.relax(context, input, det, u, g, report)?;
-        self.die_away(context, input, u, g, report)
+        self.report.parts = 1;
+        self.relax(det, u, g)?;
+        self.die_away(u, g)
     }
 
     /// BDF2 alone, from the free motion of the natural modes.
-    fn balance_from(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        u: &mut [f32],
-        g: &mut [f32],
-        report: &mut Report,
-    ) -> Result<()> {
+    fn balance_from(&mut self, u: &mut [f32], g: &mut [f32]) -> Result<()> {
+        let (context, input) = (self.context, self.input);
         let env = context.env();
         u.copy_from_slice(input.last);
-        self.add_gravity(context, input, u)?;
-        self.lift(context, input, Some(input.last), u)?;
-        self.move_freely(env)?;
-        self.settle(env, u)?;
+        add_gravity(context, input, u)?;
+        lift(context, input, Some(input.last), u)?;
+        self.solver.move_freely(env)?;
+        self.solver.settle(env, u)?;
         let mut det = self
+            .solver
             .balance
-            .residual(context, [input.last, u, u], g, report)?
+            .residual(context, [input.last, u, u], g, &mut self.report)?
             .0;
         if det.is_nan() || det < SMALLEST_DET {
             u.copy_from_slice(input.last);
             det = self
+                .solver
                 .balance
-                .residual(context, [input.last, u, u], g, report)?
+                .residual(context, [input.last, u, u], g, &mut self.report)?
                 .0;
         }
-        report.parts = 1;
-        self.relax(context, input, det, u, g, report)?;
-        self.die_away(context, input, u, g, report)
+        self.report.parts = 1;
+        self.relax(det, u, g)?;
+        self.die_away(u, g)
     }
 
     /// What takes the place of a free step whose iterations ended inverted. Without contact that was rest: the field dies away instead of a jump there,
     /// and stays where a support has taken it.
-    fn die_away(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        u: &mut [f32],
-        g: &mut [f32],
-        report: &mut Report,
-    ) -> Result<()> {
-        if report.fell_back {
+    fn die_away(&mut self, u: &mut [f32], g: &mut [f32]) -> Result<()> {
+        let (context, input) = (self.context, self.input);
+        if self.report.fell_back {
             let stays = context.held.let_go != 0 || !context.held.places.is_empty();
             let kept = if stays { 1.0 } else { KEPT };
             for (u, last) in u.iter_mut().zip(input.last) {
                 *u = kept * last;
             }
-            report.min_det = self
+            self.report.min_det = self
+                .solver
                 .balance
-                .residual(context, [input.last, u, u], g, report)?
+                .residual(context, [input.last, u, u], g, &mut self.report)?
                 .0;
-            self.balance.stand();
+            self.solver.balance.stand();
         }
         Ok(())
     }
 
     /// Places, velocities, drifts and forces of the modes, from the residual `g` of the last state.
-    fn measure(&mut self, context: SolverContext<'_>, input: &Input<'_>, g: &[f32]) -> Result<()> {
+    fn measure(&mut self, g: &[f32]) -> Result<()> {
+        let (context, input) = (self.context, self.input);
         let env = context.env();
         // A step from a displacement that the host gave has no past: its velocity counts as none.
         let known = if input.still { 0.0 } else { 1.0 };
@@ -209,48 +213,55 @@ impl ImplicitSolver {
             let (preconditioner, values) = (&mut solver.preconditioner, &mut solver.free.values);
             preconditioner.on_natural(env, &solver.fields.q, values)
         };
-        weighted(self, input.last, 1.0)?;
-        self.free.take(|mode| &mut mode.place);
-        weighted(self, input.before, 1.0)?;
-        self.free.take(|mode| &mut mode.before);
+        weighted(self.solver, input.last, 1.0)?;
+        self.solver.free.take(|mode| &mut mode.place);
+        weighted(self.solver, input.before, 1.0)?;
+        self.solver.free.take(|mode| &mut mode.before);
         // Out of the solver for the call alone; put back before anything can fail.
-        let velocity = std::mem::take(&mut self.motion.velocity);
-        let measured = weighted(self, &velocity, known);
-        self.motion.velocity = velocity;
+        let velocity = std::mem::take(&mut self.solver.motion.velocity);
+        let measured = weighted(self.solver, &velocity, known);
+        self.solver.motion.velocity = velocity;
         measured?;
-        self.free.take(|mode| &mut mode.velocity);
+        self.solver.free.take(|mode| &mut mode.velocity);
         // The drift has the masses in it.
-        self.fields.q.copy_from_slice(&self.balance.drift);
-        mask_held(&env.held.is, &mut self.fields.q);
-        let values = &mut self.free.values;
-        self.preconditioner
-            .on_natural(env, &self.fields.q, values)?;
-        self.free.take(|mode| &mut mode.drift);
-        let values = &mut self.free.values;
-        self.preconditioner.on_natural(env, g, values)?;
-        self.free.take(|mode| &mut mode.inner);
-        for mode in &mut self.free.modes {
+        self.solver
+            .fields
+            .q
+            .copy_from_slice(&self.solver.balance.drift);
+        mask_held(&env.held.is, &mut self.solver.fields.q);
+        let values = &mut self.solver.free.values;
+        self.solver
+            .preconditioner
+            .on_natural(env, &self.solver.fields.q, values)?;
+        self.solver.free.take(|mode| &mut mode.drift);
+        let values = &mut self.solver.free.values;
+        self.solver.preconditioner.on_natural(env, g, values)?;
+        self.solver.free.take(|mode| &mut mode.inner);
+        for mode in &mut self.solver.free.modes {
             mode.inner -= mode.drift;
             mode.load = 0.0;
         }
-        if self.mean_load(input) {
-            mask_held(&env.held.is, &mut self.fields.q);
-            let values = &mut self.free.values;
-            self.preconditioner
-                .on_natural(env, &self.fields.q, values)?;
-            self.free.take(|mode| &mut mode.load);
+        if self.mean_load() {
+            mask_held(&env.held.is, &mut self.solver.fields.q);
+            let values = &mut self.solver.free.values;
+            self.solver
+                .preconditioner
+                .on_natural(env, &self.solver.fields.q, values)?;
+            self.solver.free.take(|mode| &mut mode.load);
         }
         Ok(())
     }
 
     /// The modes' own velocities and forces in the state being made.
-    fn finish_free(&mut self, context: SolverContext<'_>, last: &[f32], next: &[f32]) {
+    fn finish_free(&mut self, next: &[f32]) {
+        let context = self.context;
+        let last = self.input.last;
         let kappa = context.time_step.integrator.kappa() as f32;
         let masses = &context.corrections.body.mass;
         for i in 0..next.len() {
-            self.next.velocity[i] += self.free.faster[i];
-            self.next.inertia[i] =
-                masses[i / 3] * kappa * (next[i] - last[i]) + self.balance.drift[i];
+            self.solver.next.velocity[i] += self.solver.free.faster[i];
+            self.solver.next.inertia[i] =
+                masses[i / 3] * kappa * (next[i] - last[i]) + self.solver.balance.drift[i];
         }
     }
 }

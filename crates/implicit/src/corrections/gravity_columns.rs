@@ -10,6 +10,7 @@ use super::Corrections;
 use super::gravity::GravityResponse;
 use super::input::{Enough, Input, Report, SolverContext};
 use super::precondition::mask_held;
+use super::relax::FieldStep;
 use super::solver::ImplicitSolver;
 use crate::error::Result;
 use crate::field::ContactSet;
@@ -75,7 +76,13 @@ impl GravityResponse {
             let mut by_modes = memory::zeros(len, WHAT)?;
             solver.preconditioner.decode(env, &mut by_modes)?;
             mask_held(&env.held.is, &mut by_modes);
-            solver.relax(context, &input, det, &mut u, &mut g, &mut report)?;
+            FieldStep {
+                solver: &mut solver,
+                context,
+                input: &input,
+                report,
+            }
+            .relax(det, &mut u, &mut g)?;
             for (u, by_modes) in u.iter_mut().zip(&by_modes) {
                 *u = (*u - by_modes) / TRIAL;
             }
@@ -88,32 +95,29 @@ impl GravityResponse {
     }
 }
 
-impl ImplicitSolver {
-    /// Adds to a guess what the change of gravity over the step moves beside the natural modes.
-    pub(super) fn add_gravity(
-        &self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        u: &mut [f32],
-    ) -> Result<()> {
-        let Some(change) = input.load.and_then(|load| load.turned_by()) else {
-            return Ok(());
-        };
-        let response = context.corrections.gravity_response(context)?;
-        for (column, change) in response.columns.iter().zip(change) {
-            if change == 0.0 {
-                continue;
-            }
-            u.iter_mut().zip(column).for_each(|(u, w)| *u += change * w);
-            let copies = u[column.len()..].as_chunks_mut::<3>().0.iter_mut();
-            for (u, parent) in copies.zip(&response.parents) {
-                let from = &column[3 * *parent as usize..][..3];
-                u.iter_mut().zip(from).for_each(|(u, w)| *u += change * w);
-            }
+/// Adds to a guess what the change of gravity over the step moves beside the natural modes.
+pub(super) fn add_gravity(
+    context: SolverContext<'_>,
+    input: &Input<'_>,
+    u: &mut [f32],
+) -> Result<()> {
+    let Some(change) = input.load.and_then(|load| load.turned_by()) else {
+        return Ok(());
+    };
+    let response = context.corrections.gravity_response(context)?;
+    for (column, change) in response.columns.iter().zip(change) {
+        if change == 0.0 {
+            continue;
         }
-        context.held.put(u);
-        Ok(())
+        u.iter_mut().zip(column).for_each(|(u, w)| *u += change * w);
+        let copies = u[column.len()..].as_chunks_mut::<3>().0.iter_mut();
+        for (u, parent) in copies.zip(&response.parents) {
+            let from = &column[3 * *parent as usize..][..3];
+            u.iter_mut().zip(from).for_each(|(u, w)| *u += change * w);
+        }
     }
+    context.held.put(u);
+    Ok(())
 }
 
 impl Corrections {

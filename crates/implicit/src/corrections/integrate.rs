@@ -70,7 +70,12 @@ impl ImplicitSolver {
                 drift[i] = mass[i] * (a + alpha * v);
             }
         })?;
-        self.take_load(input, step_s as f32)
+        self.balance.take_load(
+            input,
+            step_s as f32,
+            &self.motion.velocity,
+            self.relaxing.as_deref(),
+        )
     }
 
     /// Velocities of a state that the model predicted and nothing corrected.
@@ -147,7 +152,7 @@ impl ImplicitSolver {
         let [bend, jerk] = [0, 1].map(|at| (sums.total(at) / nodes).sqrt());
         // Root mean square over the nodes, mm.
         let truncated = libm::hypot(BEND * bend, JERK * jerk);
-        self.leave_load()?;
+        self.next.leave_load(&self.balance.load)?;
         let own = &mut self.next;
         // Who knows better sets these after it: this is what a state has that no element was asked of.
         own.min_det = 1.0;

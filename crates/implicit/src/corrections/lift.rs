@@ -15,6 +15,7 @@ use std::sync::Arc;
 use super::boundary::Held;
 use super::group::{Group, GroupModes, Lift};
 use super::input::{Enough, Input, Report, SolverContext};
+use super::relax::FieldStep;
 use super::solver::ImplicitSolver;
 use super::whole::WholeModes;
 use crate::error::Result;
@@ -117,7 +118,13 @@ impl Lift {
                     held: &held,
                     ..context
                 };
-                columns.push(solver.answer(own, &input)?);
+                let mut trial = FieldStep {
+                    solver: &mut solver,
+                    context: own,
+                    input: &input,
+                    report: Report::default(),
+                };
+                columns.push(trial.answer()?);
             }
         }
         Ok(Lift {
@@ -128,29 +135,34 @@ impl Lift {
     }
 }
 
-impl ImplicitSolver {
+impl FieldStep<'_> {
     /// Where the body comes to rest in a step with the boundary of `context`, over [`TRIAL_MM`].
-    fn answer(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<Vec<f32>> {
+    fn answer(&mut self) -> Result<Vec<f32>> {
+        let (context, input) = (self.context, self.input);
         let env = context.env();
-        self.balance.nodes.clear();
-        self.preconditioner.prescribe(env, &[])?;
-        self.expect(context, input)?;
-        self.memory.mask(&[]);
-        self.memory.clear();
-        self.balance.drift.fill(0.0);
+        self.solver.balance.nodes.clear();
+        self.solver.preconditioner.prescribe(env, &[])?;
+        self.solver.expect(context, input)?;
+        self.solver.memory.mask(&[]);
+        self.solver.memory.clear();
+        self.solver.balance.drift.fill(0.0);
         let mut u = memory::zeros(input.last.len(), WHAT)?;
         let mut g = memory::zeros(input.last.len(), WHAT)?;
         // Only the group is displaced at first; the iterations find what the body does between it and what is held.
         context.held.put(&mut u);
-        let mut report = Report::default();
-        let (det, _) = self
-            .balance
-            .residual(context, [input.last, &u, &u], &mut g, &mut report)?;
-        self.relax(context, input, det, &mut u, &mut g, &mut report)?;
+        let (det, _) = self.solver.balance.residual(
+            context,
+            [input.last, &u, &u],
+            &mut g,
+            &mut self.report,
+        )?;
+        self.relax(det, &mut u, &mut g)?;
         u.iter_mut().for_each(|value| *value /= TRIAL_MM);
         Ok(u)
     }
+}
 
+impl ImplicitSolver {
     /// What loads and what is held ask of a step, before it begins.
     pub(super) fn expect(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<()> {
         self.stand_on(context.held.let_go);
@@ -161,108 +173,109 @@ impl ImplicitSolver {
         let has_load = input.load.is_some() || context.held.let_go != 0;
         self.preconditioner.expect_load(context.env(), has_load)
     }
+}
 
-    /// Adds to a guess that starts from `from`, or from rest, what the motion of the groups does in it; held nodes end where they are led.
-    pub(super) fn lift(
-        &self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        from: Option<&[f32]>,
-        u: &mut [f32],
-    ) -> Result<()> {
-        let held = context.held;
-        for (at, group) in context.corrections.groups.iter().enumerate() {
-            if held.let_go >> at & 1 != 0 {
-                continue;
-            }
-            let change = |node: u32| {
-                let index = held.nodes.binary_search(&node).unwrap_or(usize::MAX);
-                let (to, at) = (held.place(index), 3 * node as usize);
-                [0, 1, 2].map(|axis| to[axis] - from.map_or(0.0, |from| from[at + axis]))
-            };
-            // A group that stays has no part in the guess, and its columns need not be made for it.
-            if group.nodes.iter().all(|node| change(*node) == [0.0; 3]) {
-                continue;
-            }
-            let lift = group.lift(context, input.rest)?;
-            let amounts = lift.amounts(|at| change(group.nodes[at]));
-            for (amount, column) in amounts.into_iter().zip(&*lift.columns) {
-                lift.add((column, amount), u);
-            }
+/// Adds to a guess that starts from `from`, or from rest, what the motion of the groups does in it; held nodes end where they are led.
+pub(super) fn lift(
+    context: SolverContext<'_>,
+    input: &Input<'_>,
+    from: Option<&[f32]>,
+    u: &mut [f32],
+) -> Result<()> {
+    let held = context.held;
+    for (at, group) in context.corrections.groups.iter().enumerate() {
+        if held.let_go >> at & 1 != 0 {
+            continue;
         }
-        // The columns take the group to where it goes but for rounding; exactly there are its nodes now.
-        held.put(u);
-        Ok(())
-    }
-
-    /// Gives `held` what the groups do that it has let go; `rest [K,3]`.
-    ///
-    /// # Errors
-    /// [`crate::Error::OutOfMemory`].
-    pub fn let_go(context: SolverContext<'_>, rest: &[f32], held: &mut Held) -> Result<()> {
-        let mut fields: Vec<(&Lift, &[f32])> = Vec::new();
-        let asked = SolverContext { held, ..context };
-        for group in asked.let_go_groups() {
-            let lift = group.lift(context, rest)?;
-            let columns = lift.columns.iter();
-            memory::reserve(&mut fields, Group::MOST_COLUMNS, WHAT)?;
-            fields.extend(columns.map(|column| (lift, column.as_slice())));
-        }
-        if fields.is_empty() {
-            held.modes = GroupModes::default();
-            return Ok(());
-        }
-        let own = SolverContext {
-            time_step: &context.corrections.time_step,
-            held,
-            ..context
+        let change = |node: u32| {
+            let index = held.nodes.binary_search(&node).unwrap_or(usize::MAX);
+            let (to, at) = (held.place(index), 3 * node as usize);
+            [0, 1, 2].map(|axis| to[axis] - from.map_or(0.0, |from| from[at + axis]))
         };
-        let mut solver = ImplicitSolver::new(own)?;
-        let whole = context.corrections.whole.get().and_then(Option::as_ref);
-        let modes = solver.modes_of(own, &fields, whole)?;
-        held.modes = GroupModes(Some(Arc::new(modes)));
-        Ok(())
-    }
-
-    /// Fields as whole modes, behind those of the bundle.
-    fn modes_of(
-        &mut self,
-        context: SolverContext<'_>,
-        fields: &[(&Lift, &[f32])],
-        whole: Option<&WholeModes>,
-    ) -> Result<WholeModes> {
-        let env = context.env();
-        let (len, coarse) = (env.body.mass_of_dof.len(), env.space.count());
-        let known = whole.map_or(0, WholeModes::count);
-        let mut joined = WholeModes::with_room(len, coarse, known + fields.len(), whole)?;
-        let kappa = context.time_step.integrator.kappa() as f32;
-        let zero = memory::zeros(len, WHAT)?;
-        let mut u = memory::zeros(len, WHAT)?;
-        let mut products = [memory::zeros(len, WHAT)?, memory::zeros(len, WHAT)?];
-        let mut on_modes = memory::zeros(coarse, WHAT)?;
-        self.balance.nodes.clear();
-        self.balance.drift.fill(0.0);
-        for (at, (lift, field)) in fields.iter().enumerate() {
-            for (node, own) in u.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-                let part = if env.held.is[node] { 0.0 } else { TRIAL_MM };
-                *own = lift.row(field, node).map(|w| part * w);
-            }
-            let [stiff, heavy] = &mut products;
-            // Over so little the residual is linear: it is `(K + kappa M) u`, and the mass's part comes off below.
-            self.balance
-                .residual(context, [&zero, &u, &u], stiff, &mut Report::default())?;
-            for (i, (stiff, heavy)) in stiff.iter_mut().zip(&mut *heavy).enumerate() {
-                *heavy = env.body.mass_of_dof[i] * u[i] / TRIAL_MM;
-                *stiff = *stiff / TRIAL_MM - kappa * *heavy;
-            }
-            u.iter_mut().for_each(|value| *value /= TRIAL_MM);
-            joined.push(&u);
-            for (table, product) in products.iter().enumerate() {
-                self.preconditioner
-                    .on_natural(env, product, &mut on_modes)?;
-                joined.take_products(table, known + at, product, &on_modes);
-            }
+        // A group that stays has no part in the guess, and its columns need not be made for it.
+        if group.nodes.iter().all(|node| change(*node) == [0.0; 3]) {
+            continue;
         }
-        Ok(joined)
+        let lift = group.lift(context, input.rest)?;
+        let amounts = lift.amounts(|at| change(group.nodes[at]));
+        for (amount, column) in amounts.into_iter().zip(&*lift.columns) {
+            lift.add((column, amount), u);
+        }
     }
+    // The columns take the group to where it goes but for rounding; exactly there are its nodes now.
+    held.put(u);
+    Ok(())
+}
+
+/// Gives `held` what the groups do that it has let go; `rest [K,3]`.
+///
+/// # Errors
+/// [`crate::Error::OutOfMemory`].
+pub fn let_go(context: SolverContext<'_>, rest: &[f32], held: &mut Held) -> Result<()> {
+    let mut fields: Vec<(&Lift, &[f32])> = Vec::new();
+    let asked = SolverContext { held, ..context };
+    for group in asked.let_go_groups() {
+        let lift = group.lift(context, rest)?;
+        let columns = lift.columns.iter();
+        memory::reserve(&mut fields, Group::MOST_COLUMNS, WHAT)?;
+        fields.extend(columns.map(|column| (lift, column.as_slice())));
+    }
+    if fields.is_empty() {
+        held.modes = GroupModes::default();
+        return Ok(());
+    }
+    let own = SolverContext {
+        time_step: &context.corrections.time_step,
+        held,
+        ..context
+    };
+    let mut solver = ImplicitSolver::new(own)?;
+    let whole = context.corrections.whole.get().and_then(Option::as_ref);
+    let modes = modes_of(&mut solver, own, &fields, whole)?;
+    held.modes = GroupModes(Some(Arc::new(modes)));
+    Ok(())
+}
+
+/// Fields as whole modes, behind those of the bundle.
+fn modes_of(
+    solver: &mut ImplicitSolver,
+    context: SolverContext<'_>,
+    fields: &[(&Lift, &[f32])],
+    whole: Option<&WholeModes>,
+) -> Result<WholeModes> {
+    let env = context.env();
+    let (len, coarse) = (env.body.mass_of_dof.len(), env.space.count());
+    let known = whole.map_or(0, WholeModes::count);
+    let mut joined = WholeModes::with_room(len, coarse, known + fields.len(), whole)?;
+    let kappa = context.time_step.integrator.kappa() as f32;
+    let zero = memory::zeros(len, WHAT)?;
+    let mut u = memory::zeros(len, WHAT)?;
+    let mut products = [memory::zeros(len, WHAT)?, memory::zeros(len, WHAT)?];
+    let mut on_modes = memory::zeros(coarse, WHAT)?;
+    solver.balance.nodes.clear();
+    solver.balance.drift.fill(0.0);
+    for (at, (lift, field)) in fields.iter().enumerate() {
+        for (node, own) in u.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let part = if env.held.is[node] { 0.0 } else { TRIAL_MM };
+            *own = lift.row(field, node).map(|w| part * w);
+        }
+        let [stiff, heavy] = &mut products;
+        // Over so little the residual is linear: it is `(K + kappa M) u`, and the mass's part comes off below.
+        solver
+            .balance
+            .residual(context, [&zero, &u, &u], stiff, &mut Report::default())?;
+        for (i, (stiff, heavy)) in stiff.iter_mut().zip(&mut *heavy).enumerate() {
+            *heavy = env.body.mass_of_dof[i] * u[i] / TRIAL_MM;
+            *stiff = *stiff / TRIAL_MM - kappa * *heavy;
+        }
+        u.iter_mut().for_each(|value| *value /= TRIAL_MM);
+        joined.push(&u);
+        for (table, product) in products.iter().enumerate() {
+            solver
+                .preconditioner
+                .on_natural(env, product, &mut on_modes)?;
+            joined.take_products(table, known + at, product, &on_modes);
+        }
+    }
+    Ok(joined)
 }

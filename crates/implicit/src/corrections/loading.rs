@@ -1,63 +1,80 @@
 //! Loads in a step: off the drift before it, off the inertia that it leaves.
 
+use super::balance::Balance;
 use super::input::Input;
-use super::solver::ImplicitSolver;
+use super::motion::Motion;
+use super::relax::FieldStep;
+use super::relaxing::Relaxing;
 use crate::error::Result;
 use crate::memory;
 
-impl ImplicitSolver {
+impl Balance {
     /// Takes the loads of the step: those at its end off the drift.
-    pub(super) fn take_load(&mut self, input: &Input<'_>, step_s: f32) -> Result<()> {
-        if input.load.is_none() && self.relaxing.is_none() {
-            self.balance.load.clear();
+    pub(super) fn take_load(
+        &mut self,
+        input: &Input<'_>,
+        step_s: f32,
+        velocity: &[f32],
+        relaxing: Option<&Relaxing>,
+    ) -> Result<()> {
+        if input.load.is_none() && relaxing.is_none() {
+            self.load.clear();
             return Ok(());
         }
-        memory::fit(
-            &mut self.balance.load,
-            self.balance.drift.len(),
-            "the loads of a scene",
-        )?;
-        self.balance.load.resize(self.balance.drift.len(), 0.0);
+        memory::fit(&mut self.load, self.drift.len(), "the loads of a scene")?;
+        self.load.resize(self.drift.len(), 0.0);
         let ahead = if input.still { 0.0 } else { step_s };
-        let (last, velocity) = (input.last, &self.motion.velocity);
+        let last = input.last;
         let there = |at: usize| last[at] + ahead * velocity[at];
         match &input.load {
-            Some(load) => load.evaluate(1, input.rest, there, &mut self.balance.load),
-            None => self.balance.load.fill(0.0),
+            Some(load) => load.evaluate(1, input.rest, there, &mut self.load),
+            None => self.load.fill(0.0),
         }
-        if let Some(relaxing) = &self.relaxing {
-            relaxing.add(input.way[1], &mut self.balance.load);
+        if let Some(relaxing) = relaxing {
+            relaxing.add(input.way[1], &mut self.load);
         }
-        for (drift, load) in self.balance.drift.iter_mut().zip(&self.balance.load) {
+        for (drift, load) in self.drift.iter_mut().zip(&self.load) {
             *drift -= load;
         }
         Ok(())
     }
+}
 
+impl FieldStep<'_> {
     /// The mean load over the step into `q`; false where there is none.
-    pub(super) fn mean_load(&mut self, input: &Input<'_>) -> bool {
+    pub(super) fn mean_load(&mut self) -> bool {
+        let input = self.input;
         match &input.load {
-            Some(load) => load.evaluate(0, input.rest, |at| input.last[at], &mut self.fields.q),
-            None if self.relaxing.is_none() => return false,
-            None => self.fields.q.fill(0.0),
+            Some(load) => load.evaluate(
+                0,
+                input.rest,
+                |at| input.last[at],
+                &mut self.solver.fields.q,
+            ),
+            None if self.solver.relaxing.is_none() => return false,
+            None => self.solver.fields.q.fill(0.0),
         }
-        if let Some(relaxing) = &self.relaxing {
-            relaxing.add(input.way[0], &mut self.fields.q);
+        if let Some(relaxing) = &self.solver.relaxing {
+            relaxing.add(input.way[0], &mut self.solver.fields.q);
         }
-        for (mean, end) in self.fields.q.iter_mut().zip(&self.balance.load) {
+        for (mean, end) in self
+            .solver
+            .fields
+            .q
+            .iter_mut()
+            .zip(&self.solver.balance.load)
+        {
             *mean = 0.5 * (*mean + end);
         }
         true
     }
+}
 
-    /// Takes the loads off the inertia of the state being made, which keeps them.
-    pub(super) fn leave_load(&mut self) -> Result<()> {
-        memory::replace(
-            &mut self.next.load,
-            &self.balance.load,
-            "the loads of a scene",
-        )?;
-        for (inertia, load) in self.next.inertia.iter_mut().zip(&self.balance.load) {
+impl Motion {
+    /// Takes the loads off the inertia of this state, the one being made, which keeps them.
+    pub(super) fn leave_load(&mut self, load: &[f32]) -> Result<()> {
+        memory::replace(&mut self.load, load, "the loads of a scene")?;
+        for (inertia, load) in self.inertia.iter_mut().zip(load) {
             *inertia -= load;
         }
         Ok(())

@@ -62,6 +62,7 @@ pub use far::FarField;
 pub use group::Group;
 pub use history::{History, PAIRS};
 pub use input::{Enough, Input, Report, SolverContext};
+pub use lift::let_go;
 pub use load::{Load, LoadPoint};
 pub use local::Linearisation;
 pub use motion::Motion;

@@ -1,6 +1,9 @@
 //! A step whose contact is prescribed: where the nodes in contact end is known, and the rest of the field follows.
 
+use super::gravity_columns::add_gravity;
 use super::input::{Input, Report, SolverContext};
+use super::lift::lift;
+use super::relax::FieldStep;
 use super::solver::{ImplicitSolver, MOST_PARTS, SMALLEST_DET};
 use crate::error::Result;
 use crate::field::ContactSet;
@@ -8,116 +11,26 @@ use crate::memory;
 
 impl ImplicitSolver {
     /// Corrects `next`, which holds the model's prediction with the boundary conditions on it.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`], a panic on another thread of the pool; the past of the solver stays.
     pub fn correct(
         &mut self,
         context: SolverContext<'_>,
         input: &Input<'_>,
         next: &mut [f32],
     ) -> Result<Report> {
-        let env = context.env();
         let _awake = context.pool.keep_awake();
-        self.remember(context, input, false)?;
-        let held = &env.held.is;
-        // All room is asked for before the step begins: what follows fails by a panic of a worker alone.
-        let forces = 3 * input.contact.len();
-        memory::fit(&mut self.next.reaction, forces, "contact forces")?;
-        self.balance.nodes.clear();
-        let nodes = input.contact.nodes.iter();
-        self.balance
-            .nodes
-            .extend(nodes.filter(|&&node| !held[node as usize]));
-        // A node that is held stays held in contact: it is neither prescribed nor has it a force.
-        self.preconditioner.prescribe(env, &self.balance.nodes)?;
-        self.expect(context, input)?;
-        self.memory.begin();
-        // Pairs of the step before hold at the nodes that are free now; where a node is prescribed they count as zero.
-        self.memory.mask(&self.balance.nodes);
-        self.prepare(context, input)?;
-        let mut report = Report::default();
-
-        // The fields are out of the solver while its methods run, and come back whatever they give.
-        let mut u = std::mem::take(&mut self.fields.u);
-        let mut g = std::mem::take(&mut self.fields.g);
-        let result = self
-            .iterate(context, input, &mut u, &mut g, &mut report)
-            .and_then(|()| self.finish(context, input, &u));
-        if result.is_ok() {
-            next.copy_from_slice(&u);
-            // What fell back has followed no equation of motion, so it leaves no velocity behind.
-            if report.fell_back {
-                self.stop_next();
-                self.leave_load()?;
-            }
-            self.next.min_det = report.min_det;
-            self.estimate(&mut report);
+        if let Some(relaxing) = &mut self.relaxing {
+            relaxing.remember(context, input, false, &mut self.balance.scratch)?;
         }
-        // Forces are those of the state that stands, of which `g` is the residual.
-        let result = result.and_then(|()| self.take_reaction(context, input.contact, &g));
-        (self.fields.u, self.fields.g) = (u, g);
-        result.map(|()| report)
-    }
-
-    /// Takes `u` to where the contact is after `part` of this step, by the response of `K + kappa M`; returns the smallest det F, with the
-    /// residual in `g`.
-    pub(super) fn lead(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        part: f32,
-        u: &mut [f32],
-        g: &mut [f32],
-        report: &mut Report,
-    ) -> Result<f32> {
-        let env = context.env();
-        // The contact goes straight from the last state to what the host asks: `u_n + part (c - u_n)`.
-        let target = |index: usize| {
-            let node = self.balance.nodes[index];
-            let c = input.contact.at(node).unwrap_or_default();
-            let at = 3 * node as usize;
-            [0, 1, 2].map(|k| input.last[at + k] + part * (c[k] - input.last[at + k]))
-        };
-        self.preconditioner
-            .respond(env, target, &mut self.fields.d, u)?;
-        // The response has them there but for rounding; exactly there is what the host prescribed.
-        for index in 0..self.balance.nodes.len() {
-            let at = 3 * self.balance.nodes[index] as usize;
-            u[at..at + 3].copy_from_slice(&target(index));
+        FieldStep {
+            solver: self,
+            context,
+            input,
+            report: Report::default(),
         }
-        env.held.put(u);
-        let (det, _) = self
-            .balance
-            .residual(context, [input.last, u, u], g, report)?;
-        // Forces are known of this state even if no iteration comes.
-        self.balance.stand();
-        Ok(det)
-    }
-
-    /// Contact forces of the state that stands, `L_C^T r`: the virtual work of the whole residual on the response to each contact.
-    fn take_reaction(
-        &mut self,
-        context: SolverContext<'_>,
-        contact: &ContactSet,
-        g: &[f32],
-    ) -> Result<()> {
-        let env = context.env();
-        let held = &env.held.is;
-        let reaction = &mut self.next.reaction;
-        // What is out of balance at the contact nodes themselves, µN; `reaction` adds what the free nodes leave, which is little once the iterations end.
-        let mut rows = self.balance.at_nodes[1].as_chunks::<3>().0.iter();
-        for &node in &contact.nodes {
-            let row = match held[node as usize] {
-                true => None,
-                false => rows.next(),
-            };
-            reaction.extend(row.copied().unwrap_or_default());
-        }
-        self.preconditioner.reaction(env, g, |node, force| {
-            if let Ok(i) = contact.nodes.binary_search(&node) {
-                for (sum, force) in reaction[3 * i..3 * i + 3].iter_mut().zip(force) {
-                    *sum += force;
-                }
-            }
-        })
+        .hold_contact(next)
     }
 
     /// Force of the tissue on the instruments at the contact nodes of the last published state, in the host's order, mN.
@@ -128,34 +41,130 @@ impl ImplicitSolver {
             out[at..at + 3].copy_from_slice(&row.map(|force| -1e-3 * force));
         }
     }
+}
+
+impl FieldStep<'_> {
+    /// The step with the contact nodes where the host holds them.
+    fn hold_contact(&mut self, next: &mut [f32]) -> Result<Report> {
+        let (context, input) = (self.context, self.input);
+        let env = context.env();
+        let held = &env.held.is;
+        // All room is asked for before the step begins: what follows fails by a panic of a worker alone.
+        let forces = 3 * input.contact.len();
+        memory::fit(&mut self.solver.next.reaction, forces, "contact forces")?;
+        self.solver.balance.nodes.clear();
+        let nodes = input.contact.nodes.iter();
+        self.solver
+            .balance
+            .nodes
+            .extend(nodes.filter(|&&node| !held[node as usize]));
+        // A node that is held stays held in contact: it is neither prescribed nor has it a force.
+        self.solver
+            .preconditioner
+            .prescribe(env, &self.solver.balance.nodes)?;
+        self.solver.expect(context, input)?;
+        self.solver.memory.begin();
+        // Pairs of the step before hold at the nodes that are free now; where a node is prescribed they count as zero.
+        self.solver.memory.mask(&self.solver.balance.nodes);
+        self.solver.prepare(context, input)?;
+
+        // The fields are out of the solver while its methods run, and come back whatever they give.
+        let mut u = std::mem::take(&mut self.solver.fields.u);
+        let mut g = std::mem::take(&mut self.solver.fields.g);
+        let result = self
+            .iterate(&mut u, &mut g)
+            .and_then(|()| self.solver.finish(context, input, &u));
+        if result.is_ok() {
+            next.copy_from_slice(&u);
+            // What fell back has followed no equation of motion, so it leaves no velocity behind.
+            if self.report.fell_back {
+                self.solver.stop_next();
+                self.solver.next.leave_load(&self.solver.balance.load)?;
+            }
+            self.solver.next.min_det = self.report.min_det;
+            (self.solver.next).estimate(&self.solver.motion, &mut self.report);
+        }
+        // Forces are those of the state that stands, of which `g` is the residual.
+        let result = result.and_then(|()| self.take_reaction(&g));
+        (self.solver.fields.u, self.solver.fields.g) = (u, g);
+        result.map(|()| self.report)
+    }
+
+    /// Takes `u` to where the contact is after `part` of this step, by the response of `K + kappa M`; returns the smallest det F, with the
+    /// residual in `g`.
+    pub(super) fn lead(&mut self, part: f32, u: &mut [f32], g: &mut [f32]) -> Result<f32> {
+        let (context, input) = (self.context, self.input);
+        let env = context.env();
+        // The contact goes straight from the last state to what the host asks: `u_n + part (c - u_n)`.
+        let target = |index: usize| {
+            let node = self.solver.balance.nodes[index];
+            let c = input.contact.at(node).unwrap_or_default();
+            let at = 3 * node as usize;
+            [0, 1, 2].map(|k| input.last[at + k] + part * (c[k] - input.last[at + k]))
+        };
+        self.solver
+            .preconditioner
+            .respond(env, target, &mut self.solver.fields.d, u)?;
+        // The response has them there but for rounding; exactly there is what the host prescribed.
+        for index in 0..self.solver.balance.nodes.len() {
+            let at = 3 * self.solver.balance.nodes[index] as usize;
+            u[at..at + 3].copy_from_slice(&target(index));
+        }
+        env.held.put(u);
+        let (det, _) =
+            self.solver
+                .balance
+                .residual(context, [input.last, u, u], g, &mut self.report)?;
+        // Forces are known of this state even if no iteration comes.
+        self.solver.balance.stand();
+        Ok(det)
+    }
+
+    /// Contact forces of the state that stands, `L_C^T r`: the virtual work of the whole residual on the response to each contact.
+    fn take_reaction(&mut self, g: &[f32]) -> Result<()> {
+        let (context, contact) = (self.context, self.input.contact);
+        let env = context.env();
+        let held = &env.held.is;
+        let reaction = &mut self.solver.next.reaction;
+        // What is out of balance at the contact nodes themselves, µN; `reaction` adds what the free nodes leave, which is little once the iterations end.
+        let mut rows = self.solver.balance.at_nodes[1].as_chunks::<3>().0.iter();
+        for &node in &contact.nodes {
+            let row = match held[node as usize] {
+                true => None,
+                false => rows.next(),
+            };
+            reaction.extend(row.copied().unwrap_or_default());
+        }
+        self.solver.preconditioner.reaction(env, g, |node, force| {
+            if let Ok(i) = contact.nodes.binary_search(&node) {
+                for (sum, force) in reaction[3 * i..3 * i + 3].iter_mut().zip(force) {
+                    *sum += force;
+                }
+            }
+        })
+    }
 
     /// The first guess: the last state and the response to what the contact did since, in so many parts that the first of them does not
     /// halve the smallest det F; all parts but the last get an iteration each.
-    fn guess(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        u: &mut [f32],
-        g: &mut [f32],
-        report: &mut Report,
-    ) -> Result<f32> {
+    fn guess(&mut self, u: &mut [f32], g: &mut [f32]) -> Result<f32> {
+        let input = self.input;
         // From an inverted state no path leads back but the one from rest.
-        let lost = self.motion.min_det < SMALLEST_DET && !input.still;
+        let lost = self.solver.motion.min_det < SMALLEST_DET && !input.still;
         // Half of what the last state had: a guess that takes more than that in one go is linear where the law is not.
-        let least = SMALLEST_DET.max(0.5 * self.motion.min_det.min(1.0));
+        let least = SMALLEST_DET.max(0.5 * self.solver.motion.min_det.min(1.0));
         let mut parts = 1;
         let mut det = loop {
             if lost {
                 u.fill(0.0);
-                self.lift(context, input, None, u)?;
+                lift(self.context, input, None, u)?;
             } else {
                 u.copy_from_slice(input.last);
-                self.add_gravity(context, input, u)?;
-                self.lift(context, input, Some(input.last), u)?;
+                add_gravity(self.context, input, u)?;
+                lift(self.context, input, Some(input.last), u)?;
             }
             // Halved until the first part is gentle: what the iterations start from must not be inverted.
             let part = 1.0 / parts as f32;
-            let det = self.lead(context, input, part, u, g, report)?;
+            let det = self.lead(part, u, g)?;
             if det > least || parts == MOST_PARTS {
                 break det;
             }
@@ -165,24 +174,17 @@ impl ImplicitSolver {
         for part in 2..=parts {
             if det > SMALLEST_DET {
                 // One iteration between two parts: the next is linear about a state in balance, not about another guess.
-                self.improve(context, input.last, u, g, det, report)?;
+                self.improve(u, g, det)?;
             }
-            det = self.lead(context, input, part as f32 / parts as f32, u, g, report)?;
+            det = self.lead(part as f32 / parts as f32, u, g)?;
         }
-        report.parts = parts;
+        self.report.parts = parts;
         Ok(det)
     }
 
     /// A guess that has the contact where the host asks for it, and the iterations about it; on return `g` is the residual of `u`.
-    fn iterate(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        u: &mut [f32],
-        g: &mut [f32],
-        report: &mut Report,
-    ) -> Result<()> {
-        let det = self.guess(context, input, u, g, report)?;
-        self.relax(context, input, det, u, g, report)
+    fn iterate(&mut self, u: &mut [f32], g: &mut [f32]) -> Result<()> {
+        let det = self.guess(u, g)?;
+        self.relax(det, u, g)
     }
 }

@@ -1,19 +1,20 @@
 //! When relaxing tissue takes a state into what it remembers ([`super::relaxing`]).
 
-use elements::StressStep;
+use elements::{Scratch, StressStep};
 
 use super::Corrections;
 use super::history::History;
 use super::input::{Input, SolverContext};
+use super::relaxing::Relaxing;
 use super::solver::ImplicitSolver;
 use crate::error::{Error, Result};
 use crate::memory;
 
 const WHAT: &str = "the stresses of a cut body";
 
-impl ImplicitSolver {
+impl Relaxing {
     /// Before a step of the scene: what is remembered goes on to the last published state, and what it pushes with at the end of the step is known; with
-    /// `start` at its start too, for what happens within it.
+    /// `start` at its start too, for what happens within it. `scratch` is room for the elements.
     ///
     /// # Errors
     /// A panic on another thread of the pool.
@@ -22,34 +23,32 @@ impl ImplicitSolver {
         context: SolverContext<'_>,
         input: &Input<'_>,
         start: bool,
+        scratch: &mut Scratch,
     ) -> Result<()> {
-        let Some(own) = &mut self.relaxing else {
-            return Ok(());
-        };
         let step_s = context.time_step.integrator.step_s;
-        own.next_since_s = step_s;
-        own.next_is_new = input.still;
+        self.next_since_s = step_s;
+        self.next_is_new = input.still;
         if input.still {
-            (own.is_ready, own.has_start) = (false, true);
-            own.pushes.iter_mut().for_each(|push| push.fill(0.0));
+            (self.is_ready, self.has_start) = (false, true);
+            self.pushes.iter_mut().for_each(|push| push.fill(0.0));
             return Ok(());
         }
         // A step that is made a second time, with other contact or none.
-        if own.is_ready && (own.has_start || !start) {
+        if self.is_ready && (self.has_start || !start) {
             return Ok(());
         }
-        (own.is_ready, own.has_start) = (true, start);
+        (self.is_ready, self.has_start) = (true, start);
         let forces = &context.corrections.body.forces;
         let relaxation = forces.relaxation();
         let g0 = relaxation.over(context.corrections.time_step.integrator.step_s);
-        let step = StressStep::new(relaxation, own.since_s, [step_s, 0.0], g0);
-        let [from, to] = &mut own.pushes;
+        let step = StressStep::new(relaxation, self.since_s, [step_s, 0.0], g0);
+        let [from, to] = &mut self.pushes;
         let failed = std::sync::Mutex::new(None);
         forces.relax(
             input.last,
-            &mut own.history,
+            &mut self.history,
             &step,
-            &mut self.balance.scratch,
+            scratch,
             (to, start.then_some(from)),
             &|count, task| {
                 if let Err(error) = context.pool.run(count, task) {
@@ -59,17 +58,19 @@ impl ImplicitSolver {
                 }
             },
         );
-        own.since_s = 0.0;
+        self.since_s = 0.0;
         let failed = failed.into_inner();
         match failed.unwrap_or_else(std::sync::PoisonError::into_inner) {
             Some(error) => {
-                own.is_ready = false;
+                self.is_ready = false;
                 Err(error.into())
             }
             None => Ok(()),
         }
     }
+}
 
+impl ImplicitSolver {
     /// Checks what a snapshot remembers of stresses.
     ///
     /// # Errors

@@ -11,6 +11,7 @@ use super::load::part_of;
 use super::motion::Motion;
 use super::oscillators::Oscillators;
 use super::precondition::Preconditioner;
+use super::relax::FieldStep;
 use super::solver::ImplicitSolver;
 use super::time_step::TimeStep;
 use crate::error::Result;
@@ -25,7 +26,7 @@ pub struct Substepper {
     count: u32,
     #[held(own)]
     pub(super) time_step: Arc<TimeStep>,
-    /// From here to `motion`: those of shorter steps while whole ones are made, and the other way round; see [`ImplicitSolver::exchange`].
+    /// From here to `motion`: those of shorter steps while whole ones are made, and the other way round; see [`Substepper::exchange`].
     preconditioner: Preconditioner,
     free: Oscillators,
     pub(super) motion: Motion,
@@ -118,28 +119,26 @@ impl Substepper {
         swap(&mut self.before, &mut self.last);
         swap(&mut self.last, &mut self.next);
     }
-}
 
-impl ImplicitSolver {
     /// The solver makes shorter steps from here on; or whole ones again.
-    pub(super) fn exchange(&mut self, substepper: &mut Substepper) {
-        swap(&mut self.motion, &mut substepper.motion);
-        swap(&mut self.preconditioner, &mut substepper.preconditioner);
-        swap(&mut self.free, &mut substepper.free);
+    pub(super) fn exchange(&mut self, solver: &mut ImplicitSolver) {
+        swap(&mut solver.motion, &mut self.motion);
+        swap(&mut solver.preconditioner, &mut self.preconditioner);
+        swap(&mut solver.free, &mut self.free);
     }
 
     /// Takes the end of the last shorter step as that of the step from `input.last`.
     pub(super) fn arrive(
-        &mut self,
+        &self,
+        solver: &mut ImplicitSolver,
         context: SolverContext<'_>,
         input: &Input<'_>,
-        substepper: &Substepper,
         next: &mut [f32],
     ) -> Result<()> {
-        next.copy_from_slice(&substepper.last);
+        next.copy_from_slice(&self.last);
         // What a whole step would have left out, for the choice of the next; the rest is that of the last shorter one.
-        self.finish(context, input, next)?;
-        let (own, last) = (&mut self.next, &substepper.motion);
+        solver.finish(context, input, next)?;
+        let (own, last) = (&mut solver.next, &self.motion);
         own.velocity.copy_from_slice(&last.velocity);
         own.inertia.copy_from_slice(&last.inertia);
         own.min_det = last.min_det;
@@ -148,6 +147,47 @@ impl ImplicitSolver {
         Ok(())
     }
 
+    /// The parts of a free step one after the other, each from the end of the one before.
+    fn swing_each(
+        &mut self,
+        solver: &mut ImplicitSolver,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+    ) -> Result<Report> {
+        let mut told = Report::default();
+        for part in 1..=self.count {
+            let short = SolverContext {
+                time_step: &self.time_step,
+                ..context
+            };
+            // `still` is of the first alone, and `start` has seen to it.
+            let own = Input {
+                last: &self.last,
+                before: &self.before,
+                still: false,
+                load: input.load.map(|load| load.of_part(part, self.count)),
+                way: part_of(part, self.count),
+                ..*input
+            };
+            let report = FieldStep {
+                solver,
+                context: short,
+                input: &own,
+                report: Report::default(),
+            }
+            .swing_once(&mut self.next)?;
+            told = told.and(&report);
+            swap(&mut solver.motion, &mut solver.next);
+            self.advance();
+        }
+        Ok(Report {
+            substeps: self.count,
+            ..told
+        })
+    }
+}
+
+impl ImplicitSolver {
     /// Makes the free step from `input.last`, of shorter ones where the scene has them for that; each with at least `LEAST_SWING` iterations
     /// that its time lets in.
     ///
@@ -162,62 +202,37 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         self.begin_pairs();
         let _awake = self.relaxes().then(|| context.pool.keep_awake());
-        self.remember(context, input, true)?;
+        if let Some(relaxing) = &mut self.relaxing {
+            relaxing.remember(context, input, true, &mut self.balance.scratch)?;
+        }
         let enough = Enough {
             iterations: input.enough.iterations.max(LEAST_SWING),
             ..input.enough
         };
         let input = &Input { enough, ..*input };
         let Some(substepper) = substepper else {
-            return self.swing_once(context, input, next);
+            return FieldStep {
+                solver: self,
+                context,
+                input,
+                report: Report::default(),
+            }
+            .swing_once(next);
         };
         substepper.start(
             &self.motion,
             input,
             context.time_step.integrator.step_s as f32,
         )?;
-        self.exchange(substepper);
+        substepper.exchange(self);
         // The pairs of whole steps come back below; among those of shorter ones they would be wrong by their inertia.
         self.clear_pairs();
-        let result = self.swing_each(context, input, substepper);
-        self.exchange(substepper);
+        let result = substepper.swing_each(self, context, input);
+        substepper.exchange(self);
         // The pairs are those of shorter steps.
         self.begin_pairs();
         let report = result?;
-        self.arrive(context, input, substepper, next)?;
+        substepper.arrive(self, context, input, next)?;
         Ok(report)
-    }
-
-    /// The parts of a free step one after the other, each from the end of the one before.
-    fn swing_each(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        substepper: &mut Substepper,
-    ) -> Result<Report> {
-        let mut told = Report::default();
-        for part in 1..=substepper.count {
-            let short = SolverContext {
-                time_step: &substepper.time_step,
-                ..context
-            };
-            // `still` is of the first alone, and `start` has seen to it.
-            let own = Input {
-                last: &substepper.last,
-                before: &substepper.before,
-                still: false,
-                load: input.load.map(|load| load.of_part(part, substepper.count)),
-                way: part_of(part, substepper.count),
-                ..*input
-            };
-            let report = self.swing_once(short, &own, &mut substepper.next)?;
-            told = told.and(&report);
-            swap(&mut self.motion, &mut self.next);
-            substepper.advance();
-        }
-        Ok(Report {
-            substeps: substepper.count,
-            ..told
-        })
     }
 }

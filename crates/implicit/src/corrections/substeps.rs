@@ -7,6 +7,7 @@ use super::input::{Enough, Input, Report, SolverContext};
 use super::load::part_of;
 use super::solver::{ImplicitSolver, SMALLEST_DET};
 use super::substepper::Substepper;
+use super::tool_contact::make_loaded;
 use crate::contact::{ContactProblem, Delassus, MAX_TIES, MAX_TOOLS, Past, Placed, Tool};
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
@@ -78,16 +79,18 @@ impl ImplicitSolver {
     ) -> Result<Report> {
         problem.work.end_by(input.enough.until);
         let _awake = context.pool.keep_awake();
-        self.remember(context, input, false)?;
+        if let Some(relaxing) = &mut self.relaxing {
+            relaxing.remember(context, input, false, &mut self.balance.scratch)?;
+        }
         let Some((substeps, substepper)) = substeps else {
-            return self.make_loaded(context, input, problem, next, true);
+            return make_loaded(self, context, input, problem, next, true);
         };
         // From an inverted state a step begins at rest, and so would each of its parts.
         let lost = self.motion.min_det < SMALLEST_DET;
         if substeps.helps(self.motion.truncated_mm) && !lost {
-            return self.drive_substeps(context, input, problem, (substeps, substepper), next);
+            return substeps.drive(self, context, input, problem, substepper, next);
         }
-        let whole = self.make_loaded(context, input, problem, next, true)?;
+        let whole = make_loaded(self, context, input, problem, next, true)?;
         // Where the iterations have lost the contact they would lose it again.
         let helps = substeps.helps(libm::hypotf(self.next.truncated_mm, whole.remaining_mm));
         if whole.fell_back || !helps {
@@ -95,55 +98,61 @@ impl ImplicitSolver {
         }
         // A tool that the whole step stopped on its way is where the host has put it again.
         problem.ways.aim();
-        let parts = self.drive_substeps(context, input, problem, (substeps, substepper), next)?;
+        let parts = substeps.drive(self, context, input, problem, substepper, next)?;
         Ok(whole.and(&parts))
     }
+}
 
+impl Substeps {
     /// The step in parts: the solver and the contact change over to the shorter step's coefficients, make the parts, and change back.
     /// What the host sees of it is one step: the pasts of before it come back, and the last part's end is the step's.
-    fn drive_substeps(
+    fn drive(
         &mut self,
+        solver: &mut ImplicitSolver,
         context: SolverContext<'_>,
         input: &Input<'_>,
         problem: &mut ContactProblem,
-        (substeps, substepper): (&mut Substeps, &mut Substepper),
+        substepper: &mut Substepper,
         next: &mut [f32],
     ) -> Result<Report> {
-        self.remember(context, input, true)?;
+        if let Some(relaxing) = &mut solver.relaxing {
+            relaxing.remember(context, input, true, &mut solver.balance.scratch)?;
+        }
         substepper.start(
-            &self.motion,
+            &solver.motion,
             input,
             context.time_step.integrator.step_s as f32,
         )?;
-        substeps.past.take(&problem.past)?;
-        substeps.tools.clear();
-        substeps.tools.extend_from_slice(&problem.ways.tools);
-        substeps.from.clear();
-        substeps.from.extend_from_slice(&problem.ways.before);
-        memory::replace(&mut substeps.ties, &problem.tied.list, WHAT)?;
-        memory::replace(&mut substeps.tied_from, &problem.tied.from, WHAT)?;
-        memory::fit(&mut substeps.tied, substeps.ties.len(), WHAT)?;
-        self.exchange(substepper);
-        problem.solution.responses.exchange(&mut substeps.responses);
+        self.past.take(&problem.past)?;
+        self.tools.clear();
+        self.tools.extend_from_slice(&problem.ways.tools);
+        self.from.clear();
+        self.from.extend_from_slice(&problem.ways.before);
+        memory::replace(&mut self.ties, &problem.tied.list, WHAT)?;
+        memory::replace(&mut self.tied_from, &problem.tied.from, WHAT)?;
+        memory::fit(&mut self.tied, self.ties.len(), WHAT)?;
+        substepper.exchange(solver);
+        problem.solution.responses.exchange(&mut self.responses);
         // Solver and contact have the shorter steps' diagonal, pasts and responses between these two exchanges, and their own again after them, also where it fails.
-        let result = self.each_substep(context, input, problem, (substeps, substepper));
-        self.exchange(substepper);
-        problem.solution.responses.exchange(&mut substeps.responses);
+        let result = self.each_substep(solver, context, input, problem, substepper);
+        substepper.exchange(solver);
+        problem.solution.responses.exchange(&mut self.responses);
         // The pairs are those of shorter steps.
-        self.begin_pairs();
-        std::mem::swap(&mut problem.past, &mut substeps.past);
+        solver.begin_pairs();
+        std::mem::swap(&mut problem.past, &mut self.past);
         let report = result?;
-        self.arrive(context, input, substepper, next)?;
+        substepper.arrive(solver, context, input, next)?;
         Ok(report)
     }
 
     /// The parts one after the other: tools and ties at their places of the way, the loads of the part, and the forces that the part before ended with.
     fn each_substep(
         &mut self,
+        solver: &mut ImplicitSolver,
         context: SolverContext<'_>,
         input: &Input<'_>,
         problem: &mut ContactProblem,
-        (substeps, substepper): (&mut Substeps, &mut Substepper),
+        substepper: &mut Substepper,
     ) -> Result<Report> {
         let Substeps {
             tools,
@@ -155,14 +164,14 @@ impl ImplicitSolver {
             tied,
             broke,
             ..
-        } = substeps;
+        } = self;
         let count = substepper.count();
         let mut told = Report::default();
         let mut lost = false;
         torn.fill(false);
         broke.fill(false);
         // Those of another length of step: their curvature has another inertia in it.
-        self.clear_pairs();
+        solver.clear_pairs();
         for part in 1..=count {
             let way = part as f32 / count as f32;
             on_their_way.clear();
@@ -201,7 +210,7 @@ impl ImplicitSolver {
                 way: part_of(part, count),
                 ..*input
             };
-            let report = self.make_loaded(short, &own, problem, next, false)?;
+            let report = make_loaded(solver, short, &own, problem, next, false)?;
             for (torn, held) in torn.iter_mut().zip(&mut problem.next.tools) {
                 *torn |= held.reading.torn;
                 held.reading.torn = *torn;
@@ -210,7 +219,7 @@ impl ImplicitSolver {
                 *broke |= held.reading.broke;
                 held.reading.broke = *broke;
             }
-            std::mem::swap(&mut self.motion, &mut self.next);
+            std::mem::swap(&mut solver.motion, &mut solver.next);
             // The last one is published by the scene, or not.
             if part < count {
                 problem.commit();

@@ -21,11 +21,16 @@ mod remake;
 mod rounds;
 mod whole;
 
+pub(super) use remake::make_loaded;
+
+use super::balance::Balance;
 use super::input::{Input, Report, SolverContext};
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask_held};
 use super::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::contact::{Compliance, ContactProblem, State};
+use crate::corrections::gravity_columns::add_gravity;
+use crate::corrections::lift::lift;
 use crate::error::Result;
 
 /// A step that leaves tissue deeper inside of a tool than this has lost the contact, mm.
@@ -59,14 +64,12 @@ impl Iterate<'_> {
     /// `F(u)` and det F of a state that no iteration led to, in a step from `last`.
     fn evaluate(
         &mut self,
-        solver: &mut ImplicitSolver,
+        balance: &mut Balance,
         context: SolverContext<'_>,
         last: &[f32],
         report: &mut Report,
     ) -> Result<()> {
-        (self.det, _) = solver
-            .balance
-            .residual(context, [last, self.u, self.u], self.g, report)?;
+        (self.det, _) = balance.residual(context, [last, self.u, self.u], self.g, report)?;
         self.sunk_mm = None;
         Ok(())
     }
@@ -112,13 +115,13 @@ impl ToolStep<'_> {
             next.copy_from_slice(&u);
             if self.report.fell_back {
                 self.solver.stop_next();
-                self.solver.leave_load()?;
+                self.solver.next.leave_load(&self.solver.balance.load)?;
             }
             self.solver.next.min_det = self.report.min_det;
             self.solver.next.level = self.report.level as u32;
             // Known only now: how far the next step reaches decides whether this one's pairs are of use to it.
             self.solver.leave_level();
-            self.solver.estimate(&mut self.report);
+            (self.solver.next).estimate(&self.solver.motion, &mut self.report);
         }
         (self.solver.fields.u, self.solver.fields.g) = (u, g);
         result
@@ -157,7 +160,12 @@ impl ToolStep<'_> {
 
     /// `F(u)` and det F of a state that no iteration led to.
     fn evaluate(&mut self, at: &mut Iterate<'_>) -> Result<()> {
-        at.evaluate(self.solver, self.context, self.input.last, &mut self.report)
+        at.evaluate(
+            &mut self.solver.balance,
+            self.context,
+            self.input.last,
+            &mut self.report,
+        )
     }
 
     /// The first guess: the last state, the free motion of the natural modes, and the linear response to the tools, in parts of
@@ -179,9 +187,8 @@ impl ToolStep<'_> {
             // Each attempt begins with the forces of the last step: they belong to `input.last`.
             self.problem.restart();
             at.u.copy_from_slice(self.input.last);
-            self.solver.add_gravity(self.context, self.input, at.u)?;
-            self.solver
-                .lift(self.context, self.input, Some(self.input.last), at.u)?;
+            add_gravity(self.context, self.input, at.u)?;
+            lift(self.context, self.input, Some(self.input.last), at.u)?;
             self.solver.move_freely(env)?;
             // Parts of the tools' way, for no tool may pass a sample between two looks; and of the load, where its response inverts elements.
             let parts = ways.max(iterated);

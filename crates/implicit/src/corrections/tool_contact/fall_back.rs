@@ -2,6 +2,7 @@
 //! (`docs/decisions/018-swept-contact.md`).
 
 use super::{Iterate, SUNK_MM, ToolStep, lost_by};
+use crate::corrections::lift::lift;
 use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
 
@@ -75,7 +76,7 @@ impl ToolStep<'_> {
         // From rest the tools come from outside: their way out of the tissue of the last state means nothing there.
         self.problem.start_from_rest(self.input.rest);
         at.u.fill(0.0);
-        self.solver.lift(self.context, self.input, None, at.u)?;
+        lift(self.context, self.input, None, at.u)?;
         self.solver.preconditioner.coordinates.fill(0.0);
         let parts = self.problem.ways.parts(&self.problem.work);
         let mut part = 0;

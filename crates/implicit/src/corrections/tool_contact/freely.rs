@@ -1,6 +1,8 @@
 //! The guess of a cut body that a tool grasps.
 
 use super::{Iterate, ToolStep};
+use crate::corrections::gravity_columns::add_gravity;
+use crate::corrections::lift::lift;
 use crate::error::Result;
 
 impl ToolStep<'_> {
@@ -10,9 +12,8 @@ impl ToolStep<'_> {
         let env = self.context.env();
         self.problem.restart();
         at.u.copy_from_slice(self.input.last);
-        self.solver.add_gravity(self.context, self.input, at.u)?;
-        self.solver
-            .lift(self.context, self.input, Some(self.input.last), at.u)?;
+        add_gravity(self.context, self.input, at.u)?;
+        lift(self.context, self.input, Some(self.input.last), at.u)?;
         self.solver.move_freely(env)?;
         self.solver.settle(env, at.u)?;
         self.report.parts = 1;

@@ -4,6 +4,7 @@
 //! others (`docs/decisions/039-sound-states.md`).
 
 use super::{Iterate, ToolStep};
+use crate::corrections::lift::lift;
 use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
 
@@ -32,8 +33,7 @@ impl ToolStep<'_> {
         if was_sound {
             self.stay(at)?;
             if !self.context.corrections.groups.is_empty() {
-                self.solver
-                    .lift(self.context, self.input, Some(self.input.last), at.u)?;
+                lift(self.context, self.input, Some(self.input.last), at.u)?;
                 self.evaluate(at)?;
             }
         } else {
@@ -42,10 +42,8 @@ impl ToolStep<'_> {
             self.problem.kept.take_guess(&mut self.problem.next);
             at.u.copy_from_slice(&self.solver.fields.guess);
             self.solver.fields.d.fill(0.0);
-            let mut rest = std::mem::take(&mut self.solver.fields.d);
-            let lifted = self.solver.lift(self.context, self.input, None, &mut rest);
-            self.solver.fields.d = rest;
-            lifted?;
+            let rest = &mut self.solver.fields.d;
+            lift(self.context, self.input, None, rest)?;
             for _ in 0..HALVES {
                 self.problem.next.scale_forces(0.5);
                 let pairs = at.u.iter_mut().zip(&self.solver.fields.d);

@@ -12,26 +12,24 @@ const STOPS: [f32; 2] = [0.8, 0.0];
 /// How often a step is made again because ties break; what is pulled too hard then breaks in the next.
 const MOST_BREAKS: u32 = 6;
 
-impl ImplicitSolver {
-    /// Makes the step from `input.last` that the tools of `problem` cause, and tells them what they feel; from the pairs of the last published state, or
-    /// from those that there are.
-    pub(in crate::corrections) fn make_loaded(
-        &mut self,
-        context: SolverContext<'_>,
-        input: &Input<'_>,
-        problem: &mut ContactProblem,
-        next: &mut [f32],
-        from_published: bool,
-    ) -> Result<Report> {
-        let mut step = ToolStep {
-            solver: self,
-            context,
-            input,
-            problem,
-            report: Report::default(),
-        };
-        step.make(next, from_published)
-    }
+/// Makes the step from `input.last` that the tools of `problem` cause, and tells them what they feel; from the pairs of the last published state, or
+/// from those that there are.
+pub(in crate::corrections) fn make_loaded(
+    solver: &mut ImplicitSolver,
+    context: SolverContext<'_>,
+    input: &Input<'_>,
+    problem: &mut ContactProblem,
+    next: &mut [f32],
+    from_published: bool,
+) -> Result<Report> {
+    let mut step = ToolStep {
+        solver,
+        context,
+        input,
+        problem,
+        report: Report::default(),
+    };
+    step.make(next, from_published)
 }
 
 impl ToolStep<'_> {

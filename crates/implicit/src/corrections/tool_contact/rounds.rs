@@ -122,10 +122,11 @@ impl ToolStep<'_> {
                     .map_or(0.0, |local| local.measured.moved_mm),
             );
             self.report.remaining_mm = (moved * made.size / before.max(f64::MIN_POSITIVE)) as f32;
-            if self
-                .solver
-                .suffices(made.iterations, self.report.remaining_mm, self.input.enough)
-            {
+            if self.solver.motion.suffices(
+                made.iterations,
+                self.report.remaining_mm,
+                self.input.enough,
+            ) {
                 return Ok(());
             }
             // Tools that slide out of the inside nodes push on what the iterations know from the modes alone.

@@ -1,8 +1,9 @@
 //! Modes of the whole body, and of what a support group held, in a step that tools drive.
 
 use super::{Iterate, ToolStep};
+use crate::corrections::fields::Fields;
 use crate::corrections::precondition::mask_held;
-use crate::corrections::solver::SMALLEST_DET;
+use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 
 impl ToolStep<'_> {
@@ -27,27 +28,37 @@ impl ToolStep<'_> {
             });
             mask_held(&env.held.is, to);
         };
-        solver.with_fields(|solver, [from, scratch, left]| {
-            from.copy_from_slice(at.u);
-            unbalanced(at.g, left);
-            (solver.preconditioner).move_whole(env, left, scratch, at.u)?;
-            let moves =
-                at.u.iter()
-                    .zip(&*from)
-                    .map(|(now, from)| (now - from).abs());
-            if moves.fold(0.0, f32::max) <= unchecked_mm {
-                return Ok(());
-            }
-            // A large move is worth an evaluation of all elements: it stands only if less is out of balance than before.
-            let before = solver.balance.size(env, left)?;
-            at.evaluate(solver, *context, input.last, report)?;
-            unbalanced(at.g, left);
-            let after = solver.balance.size(env, left)?;
-            if at.det > SMALLEST_DET && after < before {
-                return Ok(());
-            }
-            at.u.copy_from_slice(from);
-            at.evaluate(solver, *context, input.last, report)
-        })
+        let ImplicitSolver {
+            preconditioner,
+            balance,
+            fields:
+                Fields {
+                    d: from,
+                    q: scratch,
+                    g_new: left,
+                    ..
+                },
+            ..
+        } = &mut **solver;
+        from.copy_from_slice(at.u);
+        unbalanced(at.g, left);
+        preconditioner.move_whole(env, left, scratch, at.u)?;
+        let moves =
+            at.u.iter()
+                .zip(&*from)
+                .map(|(now, from)| (now - from).abs());
+        if moves.fold(0.0, f32::max) <= unchecked_mm {
+            return Ok(());
+        }
+        // A large move is worth an evaluation of all elements: it stands only if less is out of balance than before.
+        let before = balance.size(env, left)?;
+        at.evaluate(balance, *context, input.last, report)?;
+        unbalanced(at.g, left);
+        let after = balance.size(env, left)?;
+        if at.det > SMALLEST_DET && after < before {
+            return Ok(());
+        }
+        at.u.copy_from_slice(from);
+        at.evaluate(balance, *context, input.last, report)
     }
 }
