@@ -1,5 +1,6 @@
 //! The scene's end: after each published state the contact problem near the tool.
 
+mod link;
 mod motion;
 mod stepped;
 mod tied;
@@ -8,11 +9,13 @@ pub mod tissue;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use ::contact::{Body, Placed, Pose, Sample, Samples, Search, Vector};
-use exchange::{Reader, Writer, exchange};
+use ::contact::{Placed, Pose, Sample, Samples, Search, Vector};
+use exchange::exchange;
 
+pub use self::link::Link;
 pub use self::stepped::Stepped;
 
+use self::link::{FeltTool, HandLine, NearSamples};
 use self::motion::{Carried, ModalRoom};
 use self::tied::OwnTies;
 use super::HapticOptions;
@@ -35,51 +38,6 @@ const AT_ONCE_S: f64 = 1e-3;
 /// Times the impedance of a sample's mass on its spring. With 1 taps on two meshes lag behind the solver's force, with 2 strokes feel
 /// too much of it (`docs/guide/haptics.md`).
 const IMPEDANCE: f32 = 1.5;
-
-/// A tool of a scene that a hand feels.
-#[derive(HeldBytes)]
-pub struct Link {
-    /// Its place in the list of the scene's tools: forces and grasps of that place are its own.
-    instrument: u32,
-    #[held(skip)]
-    body: Body,
-    friction: f32,
-    grasps: bool,
-    #[held(skip)]
-    out: Writer<ContactSnapshot>,
-    #[held(skip)]
-    pose: Reader<Pose>,
-    /// Bytes of one of the three buffers that the two threads exchange.
-    snapshot_bytes: usize,
-    /// Says to each end that the other has gone.
-    #[held(skip)]
-    ends: Arc<Ends>,
-    #[held(skip)]
-    samples: Arc<Samples>,
-    search: Search,
-    /// `W` of the published samples within [`AT_ONCE_S`]: natural modes are too slow to take part, and go on in the hand's thread.
-    delassus: Delassus,
-    inertial_compliance: Vec<f32>,
-    /// Nearest samples by distance and row, and their rows alone.
-    found: Vec<(f32, u32)>,
-    sampled: Vec<u32>,
-    /// Where the basis of each block starts.
-    starts: Vec<usize>,
-    /// A field `[K,3]` that is projected on the modes, and its block coordinates `[Q]`.
-    coordinates: Vec<f32>,
-    field: Vec<f32>,
-    /// Mass of the natural modes, g.
-    masses: Vec<f32>,
-    rows: Vec<u32>,
-    carried: Carried,
-    ties: OwnTies,
-    /// How many states were published: the hand sees by it how many it missed.
-    number: u64,
-    /// Age of a state when the hand gets it, s; the time that the step took where the host gave none.
-    latency_s: Option<f64>,
-    /// Where the hand was when the last state was published.
-    last_pose: Option<Pose>,
-}
 
 /// Both ends for a tool on a body.
 ///
@@ -104,30 +62,38 @@ pub fn join(
     let modes = Modes::new(&natural, integrator.damping_per_s)?;
     let kappa = integrator.over(AT_ONCE_S).kappa();
     let link = Link {
-        instrument: options.instrument,
-        body: tool.body.clone(),
-        friction: tool.friction,
-        grasps: tool.mode == Mode::Grasp,
-        out,
-        pose,
-        snapshot_bytes,
-        ends: Arc::clone(&ends),
-        samples: Arc::clone(&samples),
-        search: memory::tried(Search::with_room(&samples), WHAT)?,
+        tool: FeltTool {
+            instrument: options.instrument,
+            body: tool.body.clone(),
+            friction: tool.friction,
+            grasps: tool.mode == Mode::Grasp,
+        },
+        line: HandLine {
+            out,
+            pose,
+            snapshot_bytes,
+            ends: Arc::clone(&ends),
+            number: 0,
+            latency_s: options.latency_s,
+            last_pose: None,
+        },
+        near: NearSamples {
+            samples: Arc::clone(&samples),
+            search: memory::tried(Search::with_room(&samples), WHAT)?,
+            found: memory::room(4 * MOST_SAMPLES, WHAT)?,
+            sampled: memory::room(MOST_SAMPLES, WHAT)?,
+        },
         delassus: Delassus::default(),
         inertial_compliance: corrections.space.inertial_compliance(kappa)?,
-        found: memory::room(4 * MOST_SAMPLES, WHAT)?,
-        sampled: memory::room(MOST_SAMPLES, WHAT)?,
-        starts: prior.basis_starts()?,
-        coordinates: memory::zeros(prior.width(), WHAT)?,
-        field: memory::zeros(3 * corrections.body.mass.len(), WHAT)?,
-        masses: memory::collected(natural.len(), natural.iter().map(|mode| mode.1), WHAT)?,
-        rows: memory::collected(natural.len(), 0..natural.len() as u32, WHAT)?,
+        modal: ModalRoom {
+            starts: prior.basis_starts()?,
+            coordinates: memory::zeros(prior.width(), WHAT)?,
+            field: memory::zeros(3 * corrections.body.mass.len(), WHAT)?,
+            masses: memory::collected(natural.len(), natural.iter().map(|mode| mode.1), WHAT)?,
+            rows: memory::collected(natural.len(), 0..natural.len() as u32, WHAT)?,
+        },
         carried: Carried::default(),
         ties: OwnTies::default(),
-        number: 0,
-        latency_s: options.latency_s,
-        last_pose: None,
     };
     let haptics = Haptics::new(options, modes, snapshot, at, ends)?;
     Ok((link, haptics))
@@ -184,7 +150,7 @@ fn check(options: &HapticOptions) -> Result<()> {
 impl Link {
     /// Whether the hand has gone.
     pub fn is_over(&self) -> bool {
-        self.ends.hand_gone.load(Ordering::Acquire)
+        self.line.ends.hand_gone.load(Ordering::Acquire)
     }
 
     /// Publishes a state.
@@ -199,20 +165,26 @@ impl Link {
             held,
             Some((&step.corrections.space, &self.inertial_compliance)),
         );
-        let samples = &*self.samples;
+        let samples = &*self.near.samples;
         let ties = &self.ties;
-        let of = self.found.iter().map(|(_, row)| ties.sample(samples, *row));
+        let of = self
+            .near
+            .found
+            .iter()
+            .map(|(_, row)| ties.sample(samples, *row));
         let masses = of
             .clone()
             .map(|sample| mass(sample, &step.corrections.body.mass, held));
-        self.sampled.clear();
-        self.sampled.extend(self.found.iter().map(|(_, row)| *row));
+        self.near.sampled.clear();
+        self.near
+            .sampled
+            .extend(self.near.found.iter().map(|(_, row)| *row));
         let all = ties.points(samples);
-        let w = self.delassus.of(compliance, all, &self.sampled)?;
-        let snapshot = self.out.buffer();
+        let w = self.delassus.of(compliance, all, &self.near.sampled)?;
+        let snapshot = self.line.out.buffer();
         snapshot.delassus[..w.len()].copy_from_slice(w);
         snapshot.delay_s = delay(w, masses);
-        let modes = self.rows.len();
+        let modes = self.modal.rows.len();
         for (at, sample) in of.enumerate() {
             let out = &mut snapshot.at_samples[3 * at * modes..3 * (at + 1) * modes];
             out.fill(0.0);
@@ -228,37 +200,30 @@ impl Link {
                 }
             }
         }
-        let room = ModalRoom {
-            starts: &self.starts,
-            masses: &self.masses,
-            rows: &self.rows,
-            field: &mut self.field,
-            coordinates: &mut self.coordinates,
-        };
         let out = [&mut *snapshot.velocity, &mut *snapshot.drive];
-        motion::modal(step, &mut self.carried, room, out)?;
+        motion::modal(step, &mut self.carried, &mut self.modal, out)?;
         snapshot.followed_s = motion::FOLLOWED_STEPS * step.integrator.step_s;
         let state = State {
             rest: step.rest,
             u: step.u,
             start: step.u,
         };
-        let index = self.instrument as usize;
+        let index = self.tool.instrument as usize;
         let past = step
             .problem
             .and_then(|problem| Some((&problem.past, problem.past.tools.get(index)?)));
         snapshot.pose = past.map(|(_, tool)| tool.pose);
-        snapshot.count = self.found.len();
-        for (at, &(_, row)) in self.found.iter().enumerate() {
+        snapshot.count = self.near.found.len();
+        for (at, &(_, row)) in self.near.found.iter().enumerate() {
             let tie = self.ties.of(row);
-            let sample = self.ties.sample(&self.samples, row);
+            let sample = self.ties.sample(&self.near.samples, row);
             let point = sample.gather(|node| state.position(node));
             let anchor = past.and_then(|(_, tool)| tool.grasp.place(row));
             let force = past.map_or(Vector::ZERO, |(past, _)| {
                 let key = |force: &crate::contact::past::Force| (force.tool, force.sample);
                 let found = past
                     .forces
-                    .binary_search_by_key(&(self.instrument, row), key);
+                    .binary_search_by_key(&(self.tool.instrument, row), key);
                 found.map_or_else(|_| tied::force(past, row), |at| past.forces[at].force)
             });
             snapshot.points[at] = point;
@@ -267,7 +232,7 @@ impl Link {
             snapshot.carried[at] = sample.gather(base);
             snapshot.outward[at] = match tie {
                 Some(_) => Vector::X,
-                None => outward(&self.samples, row, state),
+                None => outward(&self.near.samples, row, state),
             };
             snapshot.ties[at] = tie;
             snapshot.forces[at] = force;
@@ -278,8 +243,8 @@ impl Link {
                     return tied::error(tie, &pose, point, force);
                 }
                 let pair = Pair {
-                    body: &self.body,
-                    friction: self.friction,
+                    body: &self.tool.body,
+                    friction: self.tool.friction,
                     from: &pose,
                     now: &pose,
                     anchor,
@@ -297,57 +262,64 @@ impl Link {
                 }
             });
         }
-        self.number += 1;
-        snapshot.number = self.number;
-        snapshot.latency_s = self.latency_s.unwrap_or(step.took_s);
-        self.out.publish();
+        self.line.number += 1;
+        snapshot.number = self.line.number;
+        snapshot.latency_s = self.line.latency_s.unwrap_or(step.took_s);
+        self.line.out.publish();
         Ok(())
     }
 
     /// The samples that are pushed or held by the tool, and the nearest to where the hand is now.
     fn find(&mut self, step: &Stepped<'_>) -> Result<()> {
-        let pose = *self.pose.read();
-        self.found.clear();
-        self.ties.find(step.problem, self.instrument)?;
-        memory::fit(&mut self.found, self.ties.rows().count(), WHAT)?;
-        self.found
+        let pose = *self.line.pose.read();
+        self.near.found.clear();
+        self.ties.find(step.problem, self.tool.instrument)?;
+        memory::fit(&mut self.near.found, self.ties.rows().count(), WHAT)?;
+        self.near
+            .found
             .extend(self.ties.rows().map(|row| (f32::MIN, row)));
-        let index = self.instrument as usize;
+        let index = self.tool.instrument as usize;
         if let Some(problem) = step.problem {
             let past = &problem.past;
             let anchors = past.tools.get(index).map(|tool| tool.grasp.anchors().len());
             let more = past.forces.len() + anchors.unwrap_or(0);
-            memory::reserve(&mut self.found, more, WHAT)?;
+            memory::reserve(&mut self.near.found, more, WHAT)?;
             let own = problem.past.forces.iter();
-            let own = own.filter(|force| force.tool == self.instrument);
-            self.found.extend(own.map(|force| (f32::MIN, force.sample)));
+            let own = own.filter(|force| force.tool == self.tool.instrument);
+            self.near
+                .found
+                .extend(own.map(|force| (f32::MIN, force.sample)));
             if let Some(tool) = problem.past.tools.get(index)
-                && self.grasps
+                && self.tool.grasps
             {
                 let anchors = tool.grasp.anchors().iter();
-                self.found
+                self.near
+                    .found
                     .extend(anchors.map(|anchor| (f32::MIN, anchor.sample)));
             }
         }
         // A quick hand is elsewhere before the next state: what lies on its way, if it goes on as it did, is within reach too.
-        let last = self.last_pose.replace(pose).unwrap_or(pose);
+        let last = self.line.last_pose.replace(pose).unwrap_or(pose);
         let ahead = pose.translation - last.translation;
         let on = |part: f32| Pose::from_parts(pose.translation + ahead * part, pose.rotation);
         let is_quick = ahead.length() > REACH_MM;
         let position = |node| vector(step.rest, node) + vector(step.u, node);
         // One that starts suddenly may be at the nearest part of the surface before the next state.
-        let nodes = self.samples.nodes().iter();
-        let gaps = nodes.map(|node| self.body.nearest_at(&pose, position(*node)).distance);
+        let nodes = self.near.samples.nodes().iter();
+        let gaps = nodes.map(|node| self.tool.body.nearest_at(&pose, position(*node)).distance);
         let gap = gaps.fold(f32::MAX, f32::min);
         let gap = if gap <= PUT_MM { gap.max(0.0) } else { 0.0 };
         let placed = Placed {
-            body: &self.body,
+            body: &self.tool.body,
             pose: if is_quick { on(0.5) } else { pose },
             skin: REACH_MM + gap.max(if is_quick { 0.5 * ahead.length() } else { 0.0 }),
         };
-        let near = self.search.find(&self.samples, &[placed], position);
-        memory::reserve(&mut self.found, near.len(), WHAT)?;
-        let body = &self.body;
+        let near = self
+            .near
+            .search
+            .find(&self.near.samples, &[placed], position);
+        memory::reserve(&mut self.near.found, near.len(), WHAT)?;
+        let body = &self.tool.body;
         let near = near.iter().map(|near| {
             let ways = (0..=8).map(|part| on(part as f32 / 8.0));
             let distance = match is_quick {
@@ -358,27 +330,29 @@ impl Link {
             };
             (distance, near.sample)
         });
-        self.found.extend(near);
+        self.near.found.extend(near);
         // Of equals the pushed one comes first, and stays.
-        self.found
+        self.near
+            .found
             .sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
-        self.found.dedup_by_key(|found| found.1);
-        self.found
+        self.near.found.dedup_by_key(|found| found.1);
+        self.near
+            .found
             .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        self.found.truncate(MOST_SAMPLES);
-        self.found.sort_unstable_by_key(|found| found.1);
+        self.near.found.truncate(MOST_SAMPLES);
+        self.near.found.sort_unstable_by_key(|found| found.1);
         Ok(())
     }
 
     /// Bytes held, of both ends.
     pub fn memory_bytes(&self) -> usize {
-        3 * self.snapshot_bytes + self.held_bytes()
+        3 * self.line.snapshot_bytes + self.held_bytes()
     }
 }
 
 impl Drop for Link {
     fn drop(&mut self) {
-        self.ends.scene_gone.store(true, Ordering::Release);
+        self.line.ends.scene_gone.store(true, Ordering::Release);
     }
 }
 

@@ -199,7 +199,7 @@ impl Scene {
                 "a submitted step is in flight; poll or wait first".into(),
             ));
         }
-        self.shared.with(call)
+        self.shared.guarded(self.shared.core()?, call)
     }
 
     /// Back to rest; region and points stay.

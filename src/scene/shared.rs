@@ -12,9 +12,11 @@ use crate::error::{Error, Result};
 
 /// Core, published states, and whether a panic was caught.
 pub struct Shared {
+    /// What one thread at a time steps; [`Shared::core`] never waits for it.
     core: Mutex<Core>,
     /// The readable part.
     pub published: RwLock<Published>,
+    /// A panic was caught inside of a call: the core may be half changed, and no call reads it again.
     poisoned: AtomicBool,
     /// Locked by who has the core, and by who takes the lines.
     pub record: Record,
@@ -37,7 +39,7 @@ impl Shared {
     }
 
     /// Calls with the core; a panic poisons the scene, whose state nobody can vouch for any more, and becomes an error.
-    fn guarded<T>(
+    pub fn guarded<T>(
         &self,
         mut core: MutexGuard<'_, Core>,
         call: impl FnOnce(&mut Core, &RwLock<Published>) -> Result<T>,
@@ -47,6 +49,7 @@ impl Shared {
         }
         match catch_unwind(AssertUnwindSafe(|| call(&mut core, &self.published))) {
             Ok(result) => {
+                // A worker of the pool has panicked: its error came back as a result, and what it wrote is as doubtful.
                 if matches!(result, Err(Error::Panic(_))) {
                     self.poisoned.store(true, Ordering::Release);
                 }
@@ -64,12 +67,12 @@ impl Shared {
         }
     }
 
-    /// Calls with the core, or says [`Error::Busy`].
-    pub fn with<T>(
-        &self,
-        call: impl FnOnce(&mut Core, &RwLock<Published>) -> Result<T>,
-    ) -> Result<T> {
-        self.guarded(lock(&self.core)?, call)
+    /// The core, for [`Shared::guarded`].
+    ///
+    /// # Errors
+    /// [`Error::Busy`] while another thread has it.
+    pub fn core(&self) -> Result<MutexGuard<'_, Core>> {
+        lock(&self.core)
     }
 
     /// A step of the scene's worker, which waits for a call in progress.

@@ -11,9 +11,11 @@ pub fn nearest(
     position: impl Fn(u32) -> Vector,
     place: Vector,
 ) -> Option<Sample> {
+    // All faces are looked at: this is asked where a host sets a tie, and never in a step.
     let mut found: Option<(f32, Sample)> = None;
     for nodes in faces {
         let [a, b, c] = nodes.map(&position);
+        // `false`: the surface itself is meant, not the solid behind it.
         let (point, at) = Triangle::new(a, b, c).project_local_point_and_get_location(place, false);
         let distance = point.point.distance_squared(place);
         if found.is_some_and(|(least, _)| least <= distance) {

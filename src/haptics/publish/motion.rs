@@ -63,15 +63,16 @@ struct Field<'a> {
 }
 
 /// What the modes' part of a field is made with.
-pub(super) struct ModalRoom<'a> {
+#[derive(HeldBytes)]
+pub(super) struct ModalRoom {
     /// Where the basis of each block starts.
-    pub starts: &'a [usize],
-    /// Mass of the natural modes, g, and the list of their rows.
-    pub masses: &'a [f32],
-    pub rows: &'a [u32],
-    /// A field `[K,3]`, and its block coordinates.
-    pub field: &'a mut [f32],
-    pub coordinates: &'a mut [f32],
+    pub starts: Vec<usize>,
+    /// Mass of the natural modes, g, and the list `0..m` of their rows.
+    pub masses: Vec<f32>,
+    pub rows: Vec<u32>,
+    /// A field `[K,3]` that is projected on the modes, and its block coordinates `[Q]`.
+    pub field: Vec<f32>,
+    pub coordinates: Vec<f32>,
 }
 
 /// Velocity and drive of each natural mode: `N^T M (v - v_b) / m` and `N^T (f - alpha M v_b) / m`.
@@ -81,7 +82,7 @@ pub(super) struct ModalRoom<'a> {
 pub(super) fn modal(
     step: &Stepped<'_>,
     carried: &mut Carried,
-    room: ModalRoom<'_>,
+    room: &mut ModalRoom,
     [velocity, drive]: [&mut [f32]; 2],
 ) -> Result<()> {
     let (body, groups) = (&step.corrections.body, step.corrections.groups.as_slice());
@@ -101,9 +102,16 @@ pub(super) fn modal(
             };
         }
         let (isa, pool, q) = (step.isa, step.pool, &mut *room.coordinates);
-        project_field(isa, pool, &step.prior.basis(), room.starts, room.field, q)?;
-        row_dots(isa, pool, step.corrections.space.modes(), room.rows, q, out)?;
-        for (out, mass) in out.iter_mut().zip(room.masses) {
+        project_field(isa, pool, &step.prior.basis(), &room.starts, &room.field, q)?;
+        row_dots(
+            isa,
+            pool,
+            step.corrections.space.modes(),
+            &room.rows,
+            q,
+            out,
+        )?;
+        for (out, mass) in out.iter_mut().zip(&room.masses) {
             *out /= mass;
         }
         Ok(())

@@ -48,12 +48,12 @@ impl HandTissue {
 impl Link {
     /// Goes on in another body. The hand keeps what it was told last until it is told again.
     pub fn take(&mut self, tissue: HandTissue) {
-        self.samples = tissue.samples;
-        self.search = tissue.search;
+        self.near.samples = tissue.samples;
+        self.near.search = tissue.search;
         self.inertial_compliance = tissue.inertial_compliance;
-        self.starts = tissue.starts;
-        self.field = tissue.field;
-        self.masses = tissue.masses;
+        self.modal.starts = tissue.starts;
+        self.modal.field = tissue.field;
+        self.modal.masses = tissue.masses;
         self.delassus = Delassus::default();
     }
 }

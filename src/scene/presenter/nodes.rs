@@ -28,13 +28,19 @@ pub(super) struct Nodes {
     pub forces: Vec<f32>,
     /// Columns of both, ascending, and whether a node is in contact now.
     columns: Vec<(u32, bool)>,
+    /// The columns alone.
     only: Vec<u32>,
+    /// The compliance between all of them `[3n,3n]`, upper triangle, mm/mN.
     upper: Vec<f64>,
+    /// Scratch of what is read of the bundle's tables.
     widened: Vec<f32>,
+    /// Of the columns in contact now.
     factor: ContactFactor,
     /// Of all columns and of those in contact now.
     pub dofs: Vec<u32>,
+    /// The change of the force on each of `dofs` since the step, mN.
     pub change: Vec<f32>,
+    /// Places among `dofs` of those in contact now; how far each has to go beyond what the released forces do, mm; and the forces that take them there, mN.
     held: Vec<u32>,
     wanted: Vec<f32>,
     solved: Vec<f32>,
@@ -51,6 +57,7 @@ impl Nodes {
     ) -> Option<f32> {
         /// mm².
         const SMALL: f32 = 0.05 * 0.05;
+        // Beginning both with the same little: nodes that hardly move say that all of the way is gone.
         let (mut gone, mut wanted, mut known) = (SMALL, SMALL, false);
         for &node in &self.then {
             let Some(to) = now.at(node) else {
@@ -80,6 +87,7 @@ impl Nodes {
             Some((column, true)) => Some(column as u32),
             _ => None,
         };
+        // All room is asked for before anything is written that lasts.
         let most = now.len() + self.then.len();
         self.columns.clear();
         memory::fit(&mut self.columns, most, WHAT)?;
@@ -117,6 +125,7 @@ impl Nodes {
             for j in i..order {
                 let other = means.space.at_contact(self.dofs[j] as usize);
                 let pairs = means.inertial_compliance.iter().zip(own).zip(other);
+                // `A_k = A - N diag(lost) N^T`: within the frame's time inertia holds back what the slow modes would do.
                 let lost: f32 = pairs.map(|((lost, a), b)| lost * a * b).sum();
                 self.upper[i * order + j] -= f64::from(lost);
             }
@@ -149,6 +158,7 @@ impl Nodes {
                 .sum();
             self.wanted.push(wanted - place - moved as f32);
         }
+        // With nothing in contact any more the released forces are all there is.
         let count = self.held.len();
         if count == 0 {
             return Ok(());

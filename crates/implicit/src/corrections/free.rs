@@ -45,6 +45,7 @@ impl FieldStep<'_> {
         let mut u = std::mem::take(&mut self.solver.fields.u);
         let mut g = std::mem::take(&mut self.solver.fields.g);
         // A body of which a part has been let go has other natural modes.
+        // The bundle's natural modes are those of a body that all its groups hold.
         let swings = context.held.let_go == 0;
         let result = match swings {
             true => self.swing_from(&mut u, &mut g),
@@ -53,18 +54,20 @@ impl FieldStep<'_> {
         let result = result.and_then(|()| self.solver.finish(context, input, &u));
         if result.is_ok() {
             next.copy_from_slice(&u);
-            if swings {
-                self.finish_free(next);
-            }
-            if self.report.fell_back {
-                self.solver.stop_next();
-                self.solver.next.leave_load(&self.solver.balance.load)?;
-            }
-            self.solver.next.min_det = self.report.min_det;
-            (self.solver.next).estimate(&self.solver.motion, &mut self.report);
         }
+        // Back before anything else can fail: a solver without them could make no further step.
         (self.solver.fields.u, self.solver.fields.g) = (u, g);
-        result.map(|()| self.report)
+        result?;
+        if swings {
+            self.finish_free(next);
+        }
+        if self.report.fell_back {
+            self.solver.stop_next();
+            self.solver.next.leave_load(&self.solver.balance.load)?;
+        }
+        self.solver.next.min_det = self.report.min_det;
+        (self.solver.next).estimate(&self.solver.motion, &mut self.report);
+        Ok(self.report)
     }
 
     /// Whether nothing moved in the last two steps: to the bit, for what moves by the least goes on moving.
@@ -86,6 +89,7 @@ impl FieldStep<'_> {
         );
         // Each natural mode is an oscillator `y'' + alpha y' + w² y = f`, solved over the step in closed form: BDF2 would damp it, the more the longer the step.
         self.solver.free.ready(context)?;
+        // The same field for `u`, `u_n` and the direction: nothing moves, so that the residual is `f_int(u_n)` and the drift alone.
         let still = input.last;
         // Internal forces of the last state: what the modes swing about is not linear elasticity but the law.
         let (det, _) =
@@ -203,6 +207,7 @@ impl FieldStep<'_> {
         let (context, input) = (self.context, self.input);
         let env = context.env();
         // A step from a displacement that the host gave has no past: its velocity counts as none.
+        // `place`, `before` and `velocity` are amplitudes, mm and mm/s; `drift`, `inner` and `load` are forces on the modes.
         let known = if input.still { 0.0 } else { 1.0 };
         // `N^T M x`: the modes are orthonormal by mass, so that this is what a field has of each.
         let weighted = |solver: &mut ImplicitSolver, field: &[f32], scale: f32| {
@@ -238,6 +243,7 @@ impl FieldStep<'_> {
         self.solver.preconditioner.on_natural(env, g, values)?;
         self.solver.free.take(|mode| &mut mode.inner);
         for mode in &mut self.solver.free.modes {
+            // `g` was `f_int + drift`: what is left is the internal force.
             mode.inner -= mode.drift;
             mode.load = 0.0;
         }

@@ -70,6 +70,7 @@ impl GravityResponse {
                 solver
                     .balance
                     .residual(context, [&zero, &u, &u], &mut g, &mut report)?;
+            // At rest and with no displacement the residual is the drift: `-M e`, times [`TRIAL`].
             g.copy_from_slice(&solver.balance.drift);
             mask_held(&env.held.is, &mut g);
             solver.preconditioner.move_natural(env, &g)?;
@@ -84,6 +85,7 @@ impl GravityResponse {
             }
             .relax(det, &mut u, &mut g)?;
             for (u, by_modes) in u.iter_mut().zip(&by_modes) {
+                // Per mm/s². The modes are moved by the guess itself, with the inertia of the step: here they would count twice.
                 *u = (*u - by_modes) / TRIAL;
             }
             *column = u;
@@ -110,6 +112,7 @@ pub(super) fn add_gravity(
             continue;
         }
         u.iter_mut().zip(column).for_each(|(u, w)| *u += change * w);
+        // Nodes that cuts have added move as those that they are copies of.
         let copies = u[column.len()..].as_chunks_mut::<3>().0.iter_mut();
         for (u, parent) in copies.zip(&response.parents) {
             let from = &column[3 * *parent as usize..][..3];

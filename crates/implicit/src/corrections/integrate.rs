@@ -143,6 +143,7 @@ impl ImplicitSolver {
             // SAFETY: these sums belong to this piece alone.
             let sums = unsafe { parts.part(2 * piece, 2) };
             // Second differences of displacement and velocity: zero for steady motion.
+            // What BDF2 leaves out is of third order; these differences of known states are its measure, and [`BEND`] and [`JERK`] their weights.
             sums[0] = passes::sum_of_squares(next.len(), |i| next[i] - 2.0 * last[i] + before[i]);
             sums[1] = passes::sum_of_squares(next.len(), |i| {
                 time * (velocity[i] - 2.0 * velocity_before[i] + bdf2.known * known_before[i])

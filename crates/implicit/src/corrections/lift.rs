@@ -56,6 +56,7 @@ fn functions(rest: &[f32], nodes: &[u32]) -> Result<Vec<Vec<f32>>> {
         let mut own: Vec<f64> = memory::collected(nodes.len(), along, WHAT)?;
         // Gram and Schmidt over the nodes: a group that lies in a plane, or is one node, has fewer functions.
         for other in &made {
+            // Both over `n` nodes: the functions have the mean square one.
             let part: f64 = own.iter().zip(other).map(|(a, b)| a * b).sum();
             let part = part / nodes.len() as f64;
             own.iter_mut().zip(other).for_each(|(a, b)| *a -= part * b);
@@ -81,6 +82,7 @@ impl Lift {
         let len = 3 * body.mass.len();
         // Another boundary than any scene's: all groups held, this one led by a function at a time.
         let mut held = Held::new(body.mass.len(), body.held.nodes.iter().copied())?;
+        // Zero but for the group that is asked: the others stay at rest.
         held.places = memory::zeros(3 * held.nodes.len(), WHAT)?;
         let zero = memory::zeros(len, WHAT)?;
         let input = Input {
@@ -187,6 +189,7 @@ pub(super) fn lift(
         if held.let_go >> at & 1 != 0 {
             continue;
         }
+        // How far a node of the group goes in the step, mm: from `from`, or from rest.
         let change = |node: u32| {
             let index = held.nodes.binary_search(&node).unwrap_or(usize::MAX);
             let (to, at) = (held.place(index), 3 * node as usize);
@@ -245,6 +248,7 @@ fn modes_of(
 ) -> Result<WholeModes> {
     let env = context.env();
     let (len, coarse) = (env.body.mass_of_dof.len(), env.space.count());
+    // The bundle's own come first, those of the groups behind them: a number of a mode does not change when a group is let go.
     let known = whole.map_or(0, WholeModes::count);
     let mut joined = WholeModes::with_room(len, coarse, known + fields.len(), whole)?;
     let kappa = context.time_step.integrator.kappa() as f32;

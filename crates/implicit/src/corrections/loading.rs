@@ -23,6 +23,7 @@ impl Balance {
         }
         memory::fit(&mut self.load, self.drift.len(), "the loads of a scene")?;
         self.load.resize(self.drift.len(), 0.0);
+        // Pressure follows the surface: it is taken where the tissue will be if it goes on as it did.
         let ahead = if input.still { 0.0 } else { step_s };
         let last = input.last;
         let there = |at: usize| last[at] + ahead * velocity[at];
@@ -64,6 +65,7 @@ impl FieldStep<'_> {
             .iter_mut()
             .zip(&self.solver.balance.load)
         {
+            // The trapezium of both ends: the oscillators are solved over the step, not at its end.
             *mean = 0.5 * (*mean + end);
         }
         true

@@ -68,26 +68,27 @@ impl FieldStep<'_> {
         self.solver.memory.mask(&self.solver.balance.nodes);
         self.solver.prepare(context, input)?;
 
-        // The fields are out of the solver while its methods run, and come back whatever they give.
+        // The fields are out of the solver while its methods run, and come back whatever they give, before anything else can fail: a solver without them could make no further step.
         let mut u = std::mem::take(&mut self.solver.fields.u);
         let mut g = std::mem::take(&mut self.solver.fields.g);
+        // Forces are those of the state that stands, of which `g` is the residual.
         let result = self
             .iterate(&mut u, &mut g)
-            .and_then(|()| self.solver.finish(context, input, &u));
+            .and_then(|()| self.solver.finish(context, input, &u))
+            .and_then(|()| self.take_reaction(&g));
         if result.is_ok() {
             next.copy_from_slice(&u);
-            // What fell back has followed no equation of motion, so it leaves no velocity behind.
-            if self.report.fell_back {
-                self.solver.stop_next();
-                self.solver.next.leave_load(&self.solver.balance.load)?;
-            }
-            self.solver.next.min_det = self.report.min_det;
-            (self.solver.next).estimate(&self.solver.motion, &mut self.report);
         }
-        // Forces are those of the state that stands, of which `g` is the residual.
-        let result = result.and_then(|()| self.take_reaction(&g));
         (self.solver.fields.u, self.solver.fields.g) = (u, g);
-        result.map(|()| self.report)
+        result?;
+        // What fell back has followed no equation of motion, so it leaves no velocity behind.
+        if self.report.fell_back {
+            self.solver.stop_next();
+            self.solver.next.leave_load(&self.solver.balance.load)?;
+        }
+        self.solver.next.min_det = self.report.min_det;
+        (self.solver.next).estimate(&self.solver.motion, &mut self.report);
+        Ok(self.report)
     }
 
     /// Takes `u` to where the contact is after `part` of this step, by the response of `K + kappa M`; returns the smallest det F, with the

@@ -83,6 +83,7 @@ impl Substepper {
             return Ok(());
         }
         // Hermite's cubic on the last step, at the part `s` of it: weights of the two places and the two velocities.
+        // One shorter step before the end: where BDF2 of that length wants its state before the last.
         let s = 1.0 - 1.0 / self.count as f32;
         let (s2, s3) = (s * s, s * s * s);
         let place = [
@@ -137,6 +138,7 @@ impl Substepper {
     ) -> Result<()> {
         next.copy_from_slice(&self.last);
         // What a whole step would have left out, for the choice of the next; the rest is that of the last shorter one.
+        // `input` is that of the whole step: its second differences are over the whole length.
         solver.finish(context, input, next)?;
         let (own, last) = (&mut solver.next, &self.motion);
         own.velocity.copy_from_slice(&last.velocity);
@@ -161,6 +163,7 @@ impl Substepper {
                 ..context
             };
             // `still` is of the first alone, and `start` has seen to it.
+            // `last` and `before` are one shorter step apart.
             let own = Input {
                 last: &self.last,
                 before: &self.before,

@@ -23,16 +23,35 @@ pub struct Substeps {
     limit_mm: f32,
     /// Responses of the contact at the substeps' length, kept apart from those of whole steps: both stay known.
     responses: Delassus,
-    /// Contact at the start of the step, the tools at its end, where they came from, and where they are.
+    /// Contact at the start of the step: it comes back when the parts are done, for the host has seen no other.
     past: Past,
-    tools: Vec<Tool>,
+    tools: ToolsOnTheirWay,
+    ties: TiesOnTheirWay,
+}
+
+/// The tools of the step, in the host's order.
+#[derive(HeldBytes)]
+struct ToolsOnTheirWay {
+    /// At the end of the step.
+    end: Vec<Tool>,
+    /// Where each was at its start.
     from: Vec<Pose>,
-    on_their_way: Vec<Tool>,
+    /// Where they are at the end of the part being made: on a straight line, turned about one axis.
+    now: Vec<Tool>,
+    /// Whose grasp has torn off in a part so far.
     torn: [bool; MAX_TOOLS],
-    /// The same of the ties and their far ends.
-    ties: Vec<Placed>,
-    tied_from: Vec<Vector>,
-    tied: Vec<Placed>,
+}
+
+/// The ties of the step, and their far ends, mm.
+#[derive(HeldBytes)]
+struct TiesOnTheirWay {
+    /// At the end of the step.
+    end: Vec<Placed>,
+    /// Where each far end was at its start.
+    from: Vec<Vector>,
+    /// At the end of the part being made.
+    now: Vec<Placed>,
+    /// Which have broken in a part so far.
     broke: [bool; MAX_TIES],
 }
 
@@ -46,14 +65,18 @@ impl Substeps {
             limit_mm,
             responses: Delassus::default(),
             past: Past::with_room(1024)?,
-            tools: memory::room(MAX_TOOLS, WHAT)?,
-            from: memory::room(MAX_TOOLS, WHAT)?,
-            on_their_way: memory::room(MAX_TOOLS, WHAT)?,
-            torn: [false; MAX_TOOLS],
-            ties: Vec::new(),
-            tied_from: Vec::new(),
-            tied: Vec::new(),
-            broke: [false; MAX_TIES],
+            tools: ToolsOnTheirWay {
+                end: memory::room(MAX_TOOLS, WHAT)?,
+                from: memory::room(MAX_TOOLS, WHAT)?,
+                now: memory::room(MAX_TOOLS, WHAT)?,
+                torn: [false; MAX_TOOLS],
+            },
+            ties: TiesOnTheirWay {
+                end: Vec::new(),
+                from: Vec::new(),
+                now: Vec::new(),
+                broke: [false; MAX_TIES],
+            },
         })
     }
 
@@ -124,13 +147,13 @@ impl Substeps {
             context.time_step.integrator.step_s as f32,
         )?;
         self.past.take(&problem.past)?;
-        self.tools.clear();
-        self.tools.extend_from_slice(&problem.ways.tools);
-        self.from.clear();
-        self.from.extend_from_slice(&problem.ways.before);
-        memory::replace(&mut self.ties, &problem.tied.list, WHAT)?;
-        memory::replace(&mut self.tied_from, &problem.tied.from, WHAT)?;
-        memory::fit(&mut self.tied, self.ties.len(), WHAT)?;
+        self.tools.end.clear();
+        self.tools.end.extend_from_slice(&problem.ways.tools);
+        self.tools.from.clear();
+        self.tools.from.extend_from_slice(&problem.ways.before);
+        memory::replace(&mut self.ties.end, &problem.tied.list, WHAT)?;
+        memory::replace(&mut self.ties.from, &problem.tied.from, WHAT)?;
+        memory::fit(&mut self.ties.now, self.ties.end.len(), WHAT)?;
         substepper.exchange(solver);
         problem.solution.responses.exchange(&mut self.responses);
         // Solver and contact have the shorter steps' diagonal, pasts and responses between these two exchanges, and their own again after them, also where it fails.
@@ -154,34 +177,24 @@ impl Substeps {
         problem: &mut ContactProblem,
         substepper: &mut Substepper,
     ) -> Result<Report> {
-        let Substeps {
-            tools,
-            from,
-            on_their_way,
-            torn,
-            ties,
-            tied_from,
-            tied,
-            broke,
-            ..
-        } = self;
+        let (tools, ties) = (&mut self.tools, &mut self.ties);
         let count = substepper.count();
         let mut told = Report::default();
         let mut lost = false;
-        torn.fill(false);
-        broke.fill(false);
+        tools.torn.fill(false);
+        ties.broke.fill(false);
         // Those of another length of step: their curvature has another inertia in it.
         solver.clear_pairs();
         for part in 1..=count {
             let way = part as f32 / count as f32;
-            on_their_way.clear();
-            on_their_way.extend_from_slice(tools);
-            for (tool, from) in on_their_way.iter_mut().zip(&*from) {
+            tools.now.clear();
+            tools.now.extend_from_slice(&tools.end);
+            for (tool, from) in tools.now.iter_mut().zip(&tools.from) {
                 tool.pose = pose::between(from, &tool.pose, way);
             }
-            tied.clear();
-            tied.extend_from_slice(ties);
-            for (tied, from) in tied.iter_mut().zip(&*tied_from) {
+            ties.now.clear();
+            ties.now.extend_from_slice(&ties.end);
+            for (tied, from) in ties.now.iter_mut().zip(&ties.from) {
                 tied.place = *from + (tied.place - *from) * way;
             }
             let Substepper {
@@ -192,7 +205,7 @@ impl Substeps {
                 ..
             } = &mut *substepper;
             // A substep is a step to the contact: it goes on from the forces of the one before.
-            problem.enter(on_their_way, tied, input.rest, last)?;
+            problem.enter(&tools.now, &ties.now, input.rest, last)?;
             let short = SolverContext {
                 time_step,
                 ..context
@@ -211,11 +224,11 @@ impl Substeps {
                 ..*input
             };
             let report = make_loaded(solver, short, &own, problem, next, false)?;
-            for (torn, held) in torn.iter_mut().zip(&mut problem.next.tools) {
+            for (torn, held) in tools.torn.iter_mut().zip(&mut problem.next.tools) {
                 *torn |= held.reading.torn;
                 held.reading.torn = *torn;
             }
-            for (broke, held) in broke.iter_mut().zip(&mut problem.next.ties) {
+            for (broke, held) in ties.broke.iter_mut().zip(&mut problem.next.ties) {
                 *broke |= held.reading.broke;
                 held.reading.broke = *broke;
             }

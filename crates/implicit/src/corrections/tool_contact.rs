@@ -87,8 +87,18 @@ struct ToolStep<'a> {
 }
 
 impl ToolStep<'_> {
-    /// One step with the tools where they are.
-    fn balance_loaded(&mut self, next: &mut [f32]) -> Result<()> {
+    /// One attempt at the step with the tools where they are now, from the pairs of the last published state or from those that there are; ties may break.
+    ///
+    /// It leaves the problem's `past` and the solver's `motion` as they were: those of the last published step.
+    fn balance_loaded(
+        &mut self,
+        next: &mut [f32],
+        from_published: bool,
+        breaks: bool,
+    ) -> Result<()> {
+        if from_published {
+            self.solver.begin_pairs();
+        }
         self.solver.balance.nodes.clear();
         self.problem.tied.step_s = self.context.time_step.integrator.step_s as f32;
         // Contact is a load here, and nothing is prescribed: the pairs of the whole field hold at every node.
@@ -113,18 +123,21 @@ impl ToolStep<'_> {
             .and_then(|()| self.solver.finish(self.context, self.input, at.u));
         if result.is_ok() {
             next.copy_from_slice(&u);
-            if self.report.fell_back {
-                self.solver.stop_next();
-                self.solver.next.leave_load(&self.solver.balance.load)?;
-            }
-            self.solver.next.min_det = self.report.min_det;
-            self.solver.next.level = self.report.level as u32;
-            // Known only now: how far the next step reaches decides whether this one's pairs are of use to it.
-            self.solver.leave_level();
-            (self.solver.next).estimate(&self.solver.motion, &mut self.report);
         }
+        // Back before anything else can fail: a solver without them could make no further step.
         (self.solver.fields.u, self.solver.fields.g) = (u, g);
-        result
+        result?;
+        if self.report.fell_back {
+            self.solver.stop_next();
+            self.solver.next.leave_load(&self.solver.balance.load)?;
+        }
+        self.solver.next.min_det = self.report.min_det;
+        self.solver.next.level = self.report.level as u32;
+        // Known only now: how far the next step reaches decides whether this one's pairs are of use to it.
+        self.solver.leave_level();
+        (self.solver.next).estimate(&self.solver.motion, &mut self.report);
+        self.problem.finish(state(self.input, next), breaks);
+        Ok(())
     }
 
     /// Guess, iterations, and what takes their place where they lost the contact or inverted elements; on return `at` is the state of the step.

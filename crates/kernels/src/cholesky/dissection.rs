@@ -30,6 +30,7 @@ impl SparseFactor {
             high - low
         };
         let extents = [0, 1, 2].map(extent);
+        // Of equal extents the first axis.
         let axis = (0..3).fold(0, |best, axis| match extents[axis] > extents[best] {
             true => axis,
             false => best,
@@ -37,6 +38,7 @@ impl SparseFactor {
         let middle = nodes.len() / 2;
         nodes.select_nth_unstable_by(middle, |a, b| {
             let at = |node: &u32| points[*node as usize][axis];
+            // Ties by number, so that the order is the same on every machine.
             at(a).total_cmp(&at(b)).then(a.cmp(b))
         });
         // Which half a node is in: 0, 1; 2 for those of the second that touch the first.
@@ -54,12 +56,14 @@ impl SparseFactor {
         }
         let local = &mut self.local;
         nodes[middle..].sort_unstable_by_key(|node| (local[*node as usize], *node));
+        // The order is now: first half, second half without its border, border. The border comes last, so that neither half has entries with the other.
         let parted = nodes[middle..].partition_point(|node| local[*node as usize] == 1);
         for &node in nodes.iter() {
             local[node as usize] = NONE;
         }
         let (start, end) = (range.start, range.end);
         let (middle, parted) = (start + middle, start + middle + parted);
+        // Fronts are pushed in postorder: children, then their parent. `factor` needs no stack but that of what waits.
         let before = self.fronts.len();
         let mut children = 1;
         self.dissect(matrix, points, start..middle)?;
@@ -71,10 +75,12 @@ impl SparseFactor {
         self.push_front(parted..end, (children, tree as u32))
     }
 
+    /// A front of these places: `children` wait for it, `tree` fronts end with it. What it is coupled with is found later, from the matrix.
     fn push_front(&mut self, own: Range<usize>, (children, tree): (u32, u32)) -> Result<()> {
         let front = Front {
             first: own.start as u32,
             own: own.len() as u32,
+            // Set when the pattern is walked through.
             border: 0,
             border_count: 0,
             upper: 0,

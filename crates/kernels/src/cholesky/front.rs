@@ -13,27 +13,33 @@ lanes::by_isa! {
 
 /// Compiled with the instructions of `L`; the compiler makes the vectors.
 #[inline(always)]
+// `#[target_feature]` of `by_isa!` reaches what is inlined here: the same source, other vectors.
 unsafe fn eliminate_lanes<L>(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) {
     eliminate_plain(a, width, own, is_positive);
 }
 
 #[inline(always)]
+/// Right-looking elimination by panels: within a panel each row is changed by those before it alone, then all rows below take the whole panel off in one
+/// pass, so that each of them is read and written once for [`PANEL`] rows of `U`.
 fn eliminate_plain(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) {
     let mut first = 0;
     while first < own {
         let end = (first + PANEL).min(own);
         for k in first..end {
             let (above, rows) = a.split_at_mut(k * width);
+            // Row `k` from its diagonal on: what is left of it is not read.
             let row = &mut rows[k..width];
             for earlier in first..k {
                 let earlier = &above[earlier * width + k..(earlier + 1) * width];
                 subtract(row, earlier, earlier[0]);
             }
             let pivot = row[0];
+            // A pivot that is not positive: the matrix is not positive definite and has no factor.
             *is_positive &= pivot > 0.0 && pivot.is_finite();
             if !*is_positive {
                 return;
             }
+            // `U_kk = sqrt(pivot)`; its inverse stands on the diagonal, for the solves divide by it far more often than it is made.
             let inverse = 1.0 / pivot.sqrt();
             row[0] = inverse;
             for value in &mut row[1..] {
@@ -45,6 +51,7 @@ fn eliminate_plain(a: &mut [f32], width: usize, own: usize, is_positive: &mut bo
         for (i, row) in rest.chunks_exact_mut(width).enumerate() {
             let i = end + i;
             let row = &mut row[i..];
+            // The last panel may be narrower: it takes the loop of any length.
             if end - first == PANEL {
                 let lines: [&[f32]; PANEL] =
                     std::array::from_fn(|k| &panel[k * width + i..(k + 1) * width]);
@@ -60,6 +67,7 @@ fn eliminate_plain(a: &mut [f32], width: usize, own: usize, is_positive: &mut bo
 }
 
 #[inline(always)]
+/// `row -= factor line`, as far as the shorter one goes.
 fn subtract(row: &mut [f32], line: &[f32], factor: f32) {
     for (value, line) in row.iter_mut().zip(line) {
         *value -= factor * line;
@@ -67,6 +75,7 @@ fn subtract(row: &mut [f32], line: &[f32], factor: f32) {
 }
 
 #[inline(always)]
+/// Takes off a row what a whole panel has of it: one load and one store for [`PANEL`] products. `lines` begin at the row's own column.
 fn subtract_panel(row: &mut [f32], lines: [&[f32]; PANEL]) {
     let len = row.len();
     let lines = lines.map(|line| &line[..len]);
@@ -100,6 +109,7 @@ unsafe fn back_lanes<L>(upper: &[f32], width: usize, x: &mut [f32]) {
 }
 
 #[inline(always)]
+/// By rows of `U`, which are the columns of `U^T`: each unknown is taken off all that follow as soon as it is known.
 fn forward_plain(upper: &[f32], width: usize, x: &mut [f32]) {
     for (k, row) in upper.chunks_exact(width).enumerate() {
         let y = x[k] * row[k];
@@ -109,9 +119,11 @@ fn forward_plain(upper: &[f32], width: usize, x: &mut [f32]) {
 }
 
 #[inline(always)]
+/// By rows of `U`, from the last: each needs those behind it alone.
 fn back_plain(upper: &[f32], width: usize, x: &mut [f32]) {
     for (k, row) in upper.chunks_exact(width).enumerate().rev() {
         let (line, known) = (&row[k + 1..], &x[k + 1..width]);
+        // Added in the same order on every machine: the bits do not depend on how wide its vectors are.
         let mut sums = [0.0f32; LANES];
         let (wide, rest) = line.as_chunks::<LANES>();
         let (wide_x, rest_x) = known.as_chunks::<LANES>();

@@ -45,6 +45,7 @@ impl ToolStep<'_> {
             let rest = &mut self.solver.fields.d;
             lift(self.context, self.input, None, rest)?;
             for _ in 0..HALVES {
+                // Half the way, half the forces: they belong to each other where the response is linear.
                 self.problem.next.scale_forces(0.5);
                 let pairs = at.u.iter_mut().zip(&self.solver.fields.d);
                 pairs.for_each(|(u, rest)| *u = 0.5 * (*u + rest));

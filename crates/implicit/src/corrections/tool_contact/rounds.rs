@@ -85,6 +85,7 @@ impl ToolStep<'_> {
             made.start = made.size;
         }
         let first = made.iterations;
+        // Every way out of the loop means that no further round is asked for, but for one: the base is used up.
         made.is_enough = true;
         while made.iterations < self.input.enough.iterations {
             let until = self.input.enough.until;
