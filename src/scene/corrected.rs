@@ -21,8 +21,10 @@ pub struct Corrector {
     pub solver: Box<ImplicitSolver>,
     /// Steps in parts.
     pub(super) parts: StepParts,
+    /// When a step has been corrected enough.
     #[held(skip)]
     goal: Goal,
+    /// Where the basis of each block of the linear response starts.
     pub(super) basis_starts: Vec<usize>,
     /// The length of the scene's steps, and the damping.
     #[held(skip)]
@@ -60,6 +62,7 @@ impl Goal {
 pub struct StepParts {
     /// Substeps of steps that tools drive; made at their first contact, where the options allow any.
     pub substeps: Option<Box<Substeps>>,
+    /// Of a step that tools drive, at most; below 2 every step is whole.
     pub(super) most_substeps: u32,
     /// Substeps of a step without contact; 1 for a whole one.
     pub(super) free_substeps: u32,
@@ -86,6 +89,7 @@ impl StepParts {
         if count < 2 || self.substepper.is_some() {
             return Ok(());
         }
+        // The damping is a rate, and stays.
         let whole = context.time_step.integrator;
         let integrator = whole.over(whole.step_s / f64::from(count));
         let time_step = (context.corrections).time_step(

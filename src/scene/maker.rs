@@ -29,17 +29,26 @@ use crate::stats::{SceneStats, flag};
 /// See the module. A step fills `states.next`; until it is published nothing else of the scene's state changes.
 #[derive(HeldBytes)]
 pub struct StepMaker {
+    /// Mesh, model, what is held, and cuts.
     pub(super) body: SceneBody,
+    /// As the host gave them, checked.
     #[held(skip)]
     pub(super) options: SceneOptions,
+    /// Instruction set and threads; the pool is the scene's own.
     #[held(skip)]
     pub(super) machine: Machine,
+    /// What predicts without elements: a network, a reduced map, or the linear response alone.
     pub(super) engine: Engine,
+    /// The implicit solver and when it has done enough; none where no step is corrected. [`StepMaker::memory_bytes`] counts its bytes.
     #[held(skip)]
     pub(super) corrected: Option<Box<Corrector>>,
+    /// The contact problem of instruments, and what it knows of the last step.
     pub(super) tools: ToolContact,
+    /// Gravity, forces, pressure, ties and supports of the step being made.
     pub(super) loads: SceneLoads,
+    /// Which nodes and points are decoded.
     pub(super) shown: Shown,
+    /// What a step is compared with, and the flags that it raises.
     pub(super) watch: Watch,
     pub(super) states: StepStates,
 }
@@ -170,10 +179,12 @@ impl StepMaker {
         stats: &mut SceneStats,
     ) -> Result<()> {
         // A corrected step under tools has said it just before; a free one has none.
+        // Taken, so that a step that makes no contact cannot be judged by an older one's.
         let used = self.tools.used.take();
         self.watch.compare(&self.body, &self.states, used, stats);
         let shared = lock_read(published);
         if learned {
+            // A reduced map's records are of its own predictions: they become those of the corrected states.
             self.start_from_corrected(&shared)?;
         }
         let compute = self.machine.compute();
@@ -193,6 +204,7 @@ impl StepMaker {
             stats,
         )?;
         if !learned {
+            // Points beyond the nodes' interpolation are the network's alone.
             states.next.points.fill(0.0);
             return Ok(());
         }

@@ -7,13 +7,14 @@ use std::mem::swap;
 use std::sync::Arc;
 
 use super::contact_response::ContactResponse;
-use super::extrapolation::{ToolPaths, VelocityExtrapolation};
+use super::extrapolation::VelocityExtrapolation;
+use super::known_step::KnownStep;
 use super::led::LedGroups;
 use super::nodes::{Nodes, ResponseContext};
 use super::solves::{Drive, Moves, SolveKey, Solves};
 use super::touched::TouchedTissue;
 use crate::contact::problem::Change;
-use crate::contact::{Compliance, ContactProblem, Past, State};
+use crate::contact::{Compliance, ContactProblem, State};
 use crate::error::{Error, Result};
 use crate::field::ContactSet;
 use crate::kernels::rows::{RowPlan, decode_rows};
@@ -21,7 +22,7 @@ use crate::kernels::{Isa, Pool};
 use crate::memory::{self, HeldBytes};
 use crate::scene::frame_state::FrameState;
 use crate::scene::step_input::{Contact, FrameInput};
-use crate::scene::supports::{self, GroupState};
+use crate::scene::supports;
 use crate::scene::tissue::Tissue;
 
 pub(super) const WHAT: &str = "the present state of a scene";
@@ -41,20 +42,6 @@ pub(super) struct ShownNodes<'a> {
     pub moved: &'a mut [f32],
 }
 
-/// A step: its state and velocity `[K,3]`, where tools were and pushed, nodes in contact and their forces, the tools' paths.
-#[derive(Default, HeldBytes)]
-struct KnownStep {
-    /// Which step that is.
-    step: Option<u64>,
-    last: Vec<f32>,
-    velocity: Vec<f32>,
-    past: Past,
-    then: Vec<u32>,
-    forces: Vec<f32>,
-    groups: Vec<GroupState>,
-    paths: ToolPaths,
-}
-
 /// A step, and what its tissue does after it.
 #[derive(HeldBytes)]
 pub(super) struct Between {
@@ -67,11 +54,13 @@ pub(super) struct Between {
     pool: Pool,
     #[held(skip)]
     isa: Isa,
+    /// By node: whether the mesh holds it.
     held: Vec<bool>,
     /// State of the step, its velocity, and its tissue at the moment asked for, `[K,3]`.
     last: Vec<f32>,
     velocity: Vec<f32>,
     pub free: Vec<f32>,
+    /// Where the tissue would be at the samples' nodes, once contact has moved it.
     touched: TouchedTissue,
     /// Which of the solves was shown last.
     shown: Option<usize>,
@@ -81,8 +70,11 @@ pub(super) struct Between {
     natural: Vec<f32>,
     inertial_compliance: Vec<f32>,
     rows: Vec<u32>,
+    /// How much of the last velocities goes on at each place.
     extrapolation: VelocityExtrapolation,
+    /// Contact at nodes in place of tools.
     nodes: Box<Nodes>,
+    /// Support groups where the frame's input has them.
     led: LedGroups,
     /// Where the host has nodes in this frame.
     now: ContactSet,
@@ -198,6 +190,7 @@ impl Between {
         else {
             return Ok(());
         };
+        // A host that stops stepping sees the tissue come to a stand, not drift away.
         let tau = tau.min(MOST_STEPS * scene.integrator.step_s);
         let alpha = scene.integrator.damping_per_s;
         let rest = scene.mesh.positions.as_slice();
@@ -237,6 +230,7 @@ impl Between {
                 _ => Drive::Nodes(&self.now),
             },
         };
+        // Two views of one moment ask the same: the contact is solved once for them.
         let known = solves.find(&question);
         // What is shown, and where contact is looked at.
         let touched = match (known, question.drive) {

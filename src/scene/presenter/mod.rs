@@ -4,6 +4,7 @@
 mod between;
 mod contact_response;
 mod extrapolation;
+mod known_step;
 mod led;
 mod nodes;
 mod solves;
