@@ -10,11 +10,13 @@ use crate::memory::HeldBytes;
 /// A point that lies at weights on nodes; what is not needed weighs nothing.
 #[derive(Clone, Copy, Debug, HeldBytes)]
 pub struct LoadPoint {
+    /// Nodes of the mesh, and their weights, which sum to one.
     pub nodes: [u32; 4],
     pub weights: [f32; 4],
 }
 
 impl LoadPoint {
+    /// Where each node's three numbers begin in a field, and its weight.
     fn parts(&self) -> impl Iterator<Item = (usize, f32)> {
         let parts = self.nodes.into_iter().zip(self.weights);
         parts
@@ -75,8 +77,10 @@ impl Load<'_> {
             *out = between(*from, *to);
         }
         let count = rest.len() / 3;
+        // Where a node is, mm; `at` is where its three numbers begin.
         let place = |at: usize| [0, 1, 2].map(|axis| rest[at + axis] + u(at + axis));
         for (face, nodes) in self.faces.iter().enumerate() {
+            // A corner is a node, or a point between nodes where a cut has parted a face.
             let corner = |k: usize| match (nodes[k] as usize).checked_sub(count) {
                 None => place(3 * nodes[k] as usize),
                 Some(point) => {
@@ -90,11 +94,13 @@ impl Load<'_> {
             };
             let [a, b, c] = [corner(0), corner(1), corner(2)];
             let [p, q] = [b, c].map(|end| [0, 1, 2].map(|axis| end[axis] - a[axis]));
+            // `(b - a) x (c - a)`, twice the area times the outward normal, mm².
             let twice = [
                 p[1] * q[2] - p[2] * q[1],
                 p[2] * q[0] - p[0] * q[2],
                 p[0] * q[1] - p[1] * q[0],
             ];
+            // Half of that is the area vector, and each corner bears a third of its force: Pa mm² is µN.
             let share = between(self.pascal[0][face], self.pascal[1][face]) / 6.0;
             let mut add = |at: usize, weight: f32| {
                 for (out, twice) in out[at..at + 3].iter_mut().zip(twice) {

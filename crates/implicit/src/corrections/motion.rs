@@ -67,6 +67,7 @@ impl Motion {
         for field in [velocity, velocity_before, inertia] {
             stored::check(field, len)?;
         }
+        // Empty where no load acted: snapshots of scenes without loads do not hold a field of zeros.
         if !load.is_empty() {
             stored::check(load, len)?;
         }
