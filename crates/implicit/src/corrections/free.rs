@@ -45,7 +45,6 @@ impl FieldStep<'_> {
         let mut u = std::mem::take(&mut self.solver.fields.u);
         let mut g = std::mem::take(&mut self.solver.fields.g);
         // A body of which a part has been let go has other natural modes.
-        // The bundle's natural modes are those of a body that all its groups hold.
         let swings = context.held.let_go == 0;
         let result = match swings {
             true => self.swing_from(&mut u, &mut g),

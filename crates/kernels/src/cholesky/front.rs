@@ -18,9 +18,9 @@ unsafe fn eliminate_lanes<L>(a: &mut [f32], width: usize, own: usize, is_positiv
     eliminate_plain(a, width, own, is_positive);
 }
 
-#[inline(always)]
 /// Right-looking elimination by panels: within a panel each row is changed by those before it alone, then all rows below take the whole panel off in one
 /// pass, so that each of them is read and written once for [`PANEL`] rows of `U`.
+#[inline(always)]
 fn eliminate_plain(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) {
     let mut first = 0;
     while first < own {
@@ -66,16 +66,16 @@ fn eliminate_plain(a: &mut [f32], width: usize, own: usize, is_positive: &mut bo
     }
 }
 
-#[inline(always)]
 /// `row -= factor line`, as far as the shorter one goes.
+#[inline(always)]
 fn subtract(row: &mut [f32], line: &[f32], factor: f32) {
     for (value, line) in row.iter_mut().zip(line) {
         *value -= factor * line;
     }
 }
 
-#[inline(always)]
 /// Takes off a row what a whole panel has of it: one load and one store for [`PANEL`] products. `lines` begin at the row's own column.
+#[inline(always)]
 fn subtract_panel(row: &mut [f32], lines: [&[f32]; PANEL]) {
     let len = row.len();
     let lines = lines.map(|line| &line[..len]);
@@ -108,8 +108,8 @@ unsafe fn back_lanes<L>(upper: &[f32], width: usize, x: &mut [f32]) {
     back_plain(upper, width, x);
 }
 
-#[inline(always)]
 /// By rows of `U`, which are the columns of `U^T`: each unknown is taken off all that follow as soon as it is known.
+#[inline(always)]
 fn forward_plain(upper: &[f32], width: usize, x: &mut [f32]) {
     for (k, row) in upper.chunks_exact(width).enumerate() {
         let y = x[k] * row[k];
@@ -118,8 +118,8 @@ fn forward_plain(upper: &[f32], width: usize, x: &mut [f32]) {
     }
 }
 
-#[inline(always)]
 /// By rows of `U`, from the last: each needs those behind it alone.
+#[inline(always)]
 fn back_plain(upper: &[f32], width: usize, x: &mut [f32]) {
     for (k, row) in upper.chunks_exact(width).enumerate().rev() {
         let (line, known) = (&row[k + 1..], &x[k + 1..width]);
