@@ -311,6 +311,37 @@ namespace Upt.Tests
         }
 
         [Test]
+        public void TheSampleHangsAGallBladderOnALiverThatBreathes()
+        {
+            BreathingLiver sample = Inactive().AddComponent<BreathingLiver>();
+            sample.model = Asset(Corrected);
+            sample.period = 1f;
+            sample.drawnAfter = 1f;
+            sample.speed = 30f;
+            sample.gameObject.SetActive(true);
+            float most = 0f, height = 0f;
+            int torn = 0;
+            Play(sample.gameObject, sample.Tissue, 250, frame =>
+            {
+                most = Math.Max(most, sample.Bed.Force.magnitude);
+                height = Math.Max(height, sample.Tissue.transform.position.y);
+                Assert.That(sample.Bed.Torn, Is.GreaterThanOrEqualTo(torn), "a torn tie holds again");
+                torn = sample.Bed.Torn;
+                if (frame < 40) Assert.That(torn, Is.EqualTo(0), "the bed tears while the organ breathes");
+            });
+            Assert.That(Debug.Errors, Is.Empty);
+            Assert.That(height, Is.EqualTo(0.015f).Within(1e-3f));
+            Assert.That(most, Is.InRange(50f, 1000f), "mN");
+            Assert.That(sample.Bed.Count, Is.GreaterThan(3));
+            Assert.That(torn, Is.EqualTo(sample.Bed.Count));
+            sample.Bed.hangs = new GameObject("elsewhere").AddComponent<Instrument>();
+            sample.Tissue.ResetTissue();
+            Assert.That(Debug.Errors.Count, Is.EqualTo(1));
+            Assert.That(Debug.Errors[0], Is.StringContaining("elsewhere"));
+            sample.gameObject.SetActive(false);
+        }
+
+        [Test]
         public void ATissueThatCannotBeCutSaysSoOnceAndGoesOn()
         {
             SoftTissue tissue = Phantom(Corrected);

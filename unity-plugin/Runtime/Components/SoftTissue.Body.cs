@@ -152,6 +152,7 @@ namespace Upt
         {
             StepInput input = StepInput.OfInstruments(poses, count);
             input.SupportGroups = Groups(1f);
+            Hold(ref input, 1f);
             if (cutMesh != null) cutMesh.Present(scene, clock.Since(now), input);
             else surface.Present(scene, clock.Since(now), input);
         }
@@ -168,7 +169,9 @@ namespace Upt
             StepInput input = StepInput.OfInstruments(stepPoses, submittedCount);
             double frame = now - frameBefore;
             double part = frame > 0.0 ? (clock.StepTime - frameBefore) / frame : 1.0;
-            input.SupportGroups = Groups((float)System.Math.Max(0.0, System.Math.Min(1.0, part)));
+            float way = (float)System.Math.Max(0.0, System.Math.Min(1.0, part));
+            input.SupportGroups = Groups(way);
+            Hold(ref input, way);
             return input;
         }
 
@@ -176,11 +179,13 @@ namespace Upt
         {
             foreach (Support support in supports)
                 if (support != null) support.Begin();
+            BeginBeds();
         }
 
         private void LookAtSupports(float deltaTime)
         {
             frameBefore = now - deltaTime;
+            LookAtCarried();
             foreach (Support support in supports)
                 if (support != null) support.Look(transform);
         }

@@ -433,6 +433,7 @@ namespace Upt
                 readingCount = submittedCount;
                 contactCount = scene.InstrumentContacts(ref pushes);
             }
+            TakeBeds();
             StepCounters.Add(LastTiming);
             playhead.Landed();
         }

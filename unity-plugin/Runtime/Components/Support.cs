@@ -69,7 +69,7 @@ namespace Upt
                    turned.y == startTurn.y && turned.z == startTurn.z && turned.w == startTurn.w;
         }
 
-        private static Quaternion Between(Quaternion from, Quaternion to, float part)
+        internal static Quaternion Between(Quaternion from, Quaternion to, float part)
         {
             float sign = from.x * to.x + from.y * to.y + from.z * to.z + from.w * to.w < 0f ? -1f : 1f;
             float x = sign * from.x, y = sign * from.y, z = sign * from.z, w = sign * from.w;
