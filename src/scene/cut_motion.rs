@@ -5,7 +5,7 @@ use topology::{Element, origin};
 
 use super::body::SceneBody;
 use super::corrected::Corrector;
-use crate::corrections::{History, Linearisation, Motion, SolverContext};
+use crate::corrections::{Course, History, Motion, SolverContext};
 use crate::error::Result;
 use crate::memory;
 
@@ -54,7 +54,7 @@ impl Corrector {
             motion,
             pairs: Vec::new(),
             local: Vec::new(),
-            linearisation: Linearisation::default(),
+            course: Course::default(),
             relaxing: None,
         };
         self.solver.restore(context, &history)?;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::local::{Linearisation, Record};
+use super::local::{Course, Record};
 use super::motion::Motion;
 use super::relaxing::Remembered;
 use crate::error::{Error, Result};
@@ -31,8 +31,8 @@ pub struct History {
     pub pairs: Vec<Pair>,
     /// Those of local iterations.
     pub local: Vec<Record>,
-    /// Where their tangent was taken.
-    pub linearisation: Linearisation,
+    /// What is near.
+    pub course: Course,
     /// Stresses of tissue that relaxes.
     pub relaxing: Option<Remembered>,
 }
@@ -47,7 +47,7 @@ impl History {
             motion,
             pairs,
             local,
-            linearisation,
+            course,
             // Against the elements of the scene: `ImplicitSolver::admit`.
             relaxing: _,
         } = self;
@@ -58,7 +58,7 @@ impl History {
                 pairs.len().max(local.len())
             )));
         }
-        linearisation.check(len / 3)?;
+        course.check(len / 3)?;
         for Pair { step, change } in pairs {
             stored::check(step, len)?;
             stored::check(change, len)?;

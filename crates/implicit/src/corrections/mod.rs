@@ -64,7 +64,7 @@ pub use history::{History, PAIRS};
 pub use input::{Enough, Input, Report, SolverContext};
 pub use lift::let_go;
 pub use load::{Load, LoadPoint};
-pub use local::Linearisation;
+pub use local::Course;
 pub use motion::Motion;
 pub use solver::{ImplicitSolver, SMALLEST_DET};
 pub use substepper::Substepper;

@@ -6,7 +6,7 @@ use super::balance::Balance;
 use super::fields::Fields;
 use super::history::{History, Pair};
 use super::input::SolverContext;
-use super::local::{Linearisation, LocalSolver};
+use super::local::{Course, LocalSolver};
 use super::memory::Memory;
 use super::motion::Motion;
 use super::oscillators::Oscillators;
@@ -84,6 +84,9 @@ impl ImplicitSolver {
             relaxing.clear();
         }
         self.clear_pairs();
+        if let Some(local) = &mut self.local {
+            local.coming.clear();
+        }
         self.commit_pairs();
     }
 
@@ -102,7 +105,7 @@ impl ImplicitSolver {
         self.memory.clear();
         if let Some(local) = &mut self.local {
             local.pairs.clear();
-            local.tangent.factor.clear();
+            local.coming.clear_tangent();
         }
     }
 
@@ -111,7 +114,16 @@ impl ImplicitSolver {
         self.memory.begin();
         if let Some(local) = &mut self.local {
             local.pairs.begin();
-            local.tangent.factor.begin();
+            local.coming.begin();
+        }
+    }
+
+    /// Back to the pairs of whole steps, of which none is known to the tangent; what is near stays.
+    pub(super) fn end_substeps(&mut self) {
+        self.memory.begin();
+        if let Some(local) = &mut self.local {
+            local.pairs.begin();
+            local.coming.clear_tangent();
         }
     }
 
@@ -120,29 +132,18 @@ impl ImplicitSolver {
         self.memory.commit();
         if let Some(local) = &mut self.local {
             local.pairs.commit();
-            local.tangent.factor.commit();
+            local.coming.commit();
         }
     }
 
     /// The state being made becomes the last.
     pub fn commit(&mut self) {
-        self.leave_level();
         std::mem::swap(&mut self.motion, &mut self.next);
         self.groups.before = self.groups.now;
         if let Some(relaxing) = &mut self.relaxing {
             relaxing.commit();
         }
         self.commit_pairs();
-    }
-
-    /// Where the next step reaches farther, or no longer as far, the local pairs are of no use: what they know of a narrower set is linear where the
-    /// wider one is not.
-    pub(super) fn leave_level(&mut self) {
-        if let Some(local) = &mut self.local
-            && self.next.level != self.motion.level
-        {
-            local.pairs.clear();
-        }
     }
 
     /// A copy of what is remembered, with the forces at `contacts` nodes.
@@ -162,9 +163,9 @@ impl ImplicitSolver {
                 Some(local) => local.pairs.copy()?,
                 None => Vec::new(),
             },
-            linearisation: match &self.local {
-                Some(local) => local.tangent.factor.copy()?,
-                None => Linearisation::default(),
+            course: match &self.local {
+                Some(local) => local.coming.copy()?,
+                None => Course::default(),
             },
             relaxing: match &self.relaxing {
                 Some(relaxing) => Some(relaxing.remembered()?),
@@ -182,7 +183,7 @@ impl ImplicitSolver {
             motion,
             pairs,
             local,
-            linearisation,
+            course,
             relaxing,
         } = history;
         let corrections = context.corrections;
@@ -197,16 +198,19 @@ impl ImplicitSolver {
             (None, _) => {}
         }
         self.clear_pairs();
+        if let Some(local) = &mut self.local {
+            local.coming.clear();
+        }
         self.commit_pairs();
         for Pair { step, change } in pairs {
             self.memory.store(context.env(), step, 1.0, change)?;
         }
         self.memory.commit();
-        if local.is_empty() && linearisation.u.is_empty() {
+        if local.is_empty() && !course.is_any() {
             return Ok(());
         }
         let solver = LocalSolver::made(&mut self.local, context)?;
-        solver.tangent.factor.restore(linearisation)?;
+        solver.coming.restore(course)?;
         solver.pairs.restore(local)
     }
 }

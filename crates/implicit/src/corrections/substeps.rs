@@ -160,8 +160,7 @@ impl Substeps {
         let result = self.each_substep(solver, context, input, problem, substepper);
         substepper.exchange(solver);
         problem.solution.responses.exchange(&mut self.responses);
-        // The pairs are those of shorter steps.
-        solver.begin_pairs();
+        solver.end_substeps();
         std::mem::swap(&mut problem.past, &mut self.past);
         let report = result?;
         substepper.arrive(solver, context, input, next)?;
@@ -184,6 +183,7 @@ impl Substeps {
         tools.torn.fill(false);
         ties.broke.fill(false);
         // Those of another length of step: their curvature has another inertia in it.
+        solver.begin_pairs();
         solver.clear_pairs();
         for part in 1..=count {
             let way = part as f32 / count as f32;

@@ -133,8 +133,6 @@ impl ToolStep<'_> {
         }
         self.solver.next.min_det = self.report.min_det;
         self.solver.next.level = self.report.level as u32;
-        // Known only now: how far the next step reaches decides whether this one's pairs are of use to it.
-        self.solver.leave_level();
         (self.solver.next).estimate(&self.solver.motion, &mut self.report);
         self.problem.finish(state(self.input, next), breaks);
         Ok(())

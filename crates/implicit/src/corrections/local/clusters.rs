@@ -12,6 +12,58 @@ use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::Stored;
 use crate::memory::{self, HeldBytes};
 
+/// What a near set leaves of the clusters that it has a part of.
+#[derive(Default, HeldBytes)]
+pub(super) struct LeftOut {
+    /// Such clusters, ascending, and the volume of their far elements, mm³; zero where all are near.
+    volumes: Vec<(u32, f64)>,
+    /// `sum v grad Phi` over the far elements of those that have some, one after another `[9,r]`.
+    on_modes: Vec<f32>,
+}
+
+impl LeftOut {
+    /// Takes what is near out of the clusters.
+    ///
+    /// Exactly: the law of the far elements is convex about their own mean alone. With the mean of whole clusters in its place steps grew to 100 mm.
+    pub fn fill(
+        &mut self,
+        env: Env<'_>,
+        far: &FarField,
+        near: &NearSet,
+        room: &mut Room,
+    ) -> Result<()> {
+        let size = NINE * env.space.count();
+        self.volumes.clear();
+        self.on_modes.clear();
+        memory::fit(&mut self.on_modes, size * near.parts.iter().count(), WHAT)?;
+        for part in near.parts.iter() {
+            let chunks = far.chunks_of(part.cluster);
+            let whole: f64 = far.volumes[chunks].iter().sum();
+            let volume = whole - part.volume;
+            // What rounding leaves of a cluster is nothing.
+            let volume = if volume > 1e-4 * whole { volume } else { 0.0 };
+            memory::push(&mut self.volumes, (part.cluster as u32, volume), WHAT)?;
+            if volume == 0.0 {
+                continue;
+            }
+            let start = self.on_modes.len();
+            self.on_modes.resize(start + size, 0.0);
+            let own = &mut self.on_modes[start..];
+            add_chunks(far, part.cluster, own);
+            room.products_on_modes(env, near, near.parts.weights(part))?;
+            add(-1.0, &room.linear, own);
+        }
+        Ok(())
+    }
+}
+
+/// Adds `sum v grad Phi [9,r]` of all of a cluster.
+fn add_chunks(far: &FarField, cluster: usize, own: &mut [f32]) {
+    for chunk in far.chunks_of(cluster) {
+        add(1.0, &far.on_modes[chunk * own.len()..][..own.len()], own);
+    }
+}
+
 /// See [`crate::corrections::far`].
 #[derive(HeldBytes)]
 pub(super) struct Clusters {
@@ -45,44 +97,34 @@ impl Clusters {
         })
     }
 
-    /// Takes what is near out.
-    ///
-    /// Exactly: the law of the far elements is convex about their own mean alone. With the mean of whole clusters in its place steps grew to 100 mm.
-    pub fn leave_out(
-        &mut self,
-        env: Env<'_>,
-        far: &FarField,
-        near: &NearSet,
-        room: &mut Room,
-    ) -> Result<()> {
-        let modes = env.space.count();
-        let size = NINE * modes;
+    /// Takes what clusters have without what is near; the others are whole.
+    pub fn take(&mut self, far: &FarField, left: &LeftOut) {
+        let size = self.on_modes.len() / self.volumes.len().max(1);
+        let mut tables = left.on_modes.chunks_exact(size.max(1));
+        let mut cut = left.volumes.iter().peekable();
         for cluster in 0..self.volumes.len() {
-            let part = near.parts.of(cluster);
-            if part.is_none() && !self.is_cut[cluster] {
+            let own = &mut self.on_modes[cluster * size..][..size];
+            let left = cut.next_if(|(number, _)| *number as usize == cluster);
+            if left.is_none() && !self.is_cut[cluster] {
                 continue;
             }
-            self.is_cut[cluster] = part.is_some();
-            let chunks = far.chunks_of(cluster);
-            let whole: f64 = far.volumes[chunks.clone()].iter().sum();
-            let volume = whole - part.map_or(0.0, |part| part.volume);
-            let own = &mut self.on_modes[cluster * size..(cluster + 1) * size];
+            self.is_cut[cluster] = left.is_some();
             own.fill(0.0);
-            // What rounding leaves of a cluster is nothing.
-            self.volumes[cluster] = if volume > 1e-4 * whole { volume } else { 0.0 };
-            if self.volumes[cluster] == 0.0 {
-                continue;
+            match left {
+                Some((_, volume)) => {
+                    self.volumes[cluster] = *volume;
+                    if *volume > 0.0
+                        && let Some(table) = tables.next()
+                    {
+                        own.copy_from_slice(table);
+                    }
+                }
+                None => {
+                    self.volumes[cluster] = far.volumes[far.chunks_of(cluster)].iter().sum();
+                    add_chunks(far, cluster, own);
+                }
             }
-            for chunk in chunks {
-                add(1.0, &far.on_modes[chunk * size..(chunk + 1) * size], own);
-            }
-            let Some(part) = part else {
-                continue;
-            };
-            room.products_on_modes(env, near, near.parts.weights(part))?;
-            add(-1.0, &room.linear, own);
         }
-        Ok(())
     }
 
     /// Takes the field `[K,3]` as the base.

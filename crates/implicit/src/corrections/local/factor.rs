@@ -39,64 +39,24 @@ const ATTEMPTS: [(bool, f32); 5] = [
 /// See the module.
 #[derive(Default, HeldBytes)]
 pub(in crate::corrections) struct NearFactor {
-    /// Where the tangent is taken in the step being made, in the last published one, and in the factor that there is.
-    current: Linearisation,
-    published: Linearisation,
+    /// Where the tangent of the factor that there is was taken.
     made: Linearisation,
     /// Rows of the core, columns of the free nodes, by place.
     rows: BlockRows,
-    /// Of each element: the blocks of its corners.
-    targets: Vec<[u32; 16]>,
+    /// Of each element with a corner in the core: which of the near ones it is, and the blocks of its corners.
+    targets: Vec<(u32, [u32; 16])>,
     factor: SparseFactor,
     /// Where the core's nodes are at rest.
     points: Vec<[f32; 3]>,
-    /// Of each row: the elements at its node, each as four times its index and the node's corner in it.
+    /// Of each row: the elements at its node, each as four times its place in `targets` and the node's corner in it.
     entries: Vec<u32>,
     /// By free place: where the entry of that column is, while a row is made.
     entry_of: Vec<u32>,
-    /// Factors made so far, for what is kept of one.
+    /// The number of the factor, for what is kept of one: no other has it.
     pub generation: u64,
 }
 
 impl NearFactor {
-    /// Back to the last published state.
-    pub fn begin(&mut self) {
-        self.current.take(&self.published);
-    }
-
-    /// The state being made is published.
-    pub fn commit(&mut self) {
-        self.published.take(&self.current);
-    }
-
-    /// Forgets where the tangent was taken, in the step being made.
-    pub fn clear(&mut self) {
-        self.current.clear();
-    }
-
-    /// A copy of what is kept of the last published state.
-    pub fn copy(&self) -> Result<Linearisation> {
-        let mut copy = Linearisation::default();
-        copy.fit(&self.published)?;
-        copy.take(&self.published);
-        Ok(copy)
-    }
-
-    /// Takes what was kept.
-    pub fn restore(&mut self, kept: &Linearisation) -> Result<()> {
-        self.fit(kept)?;
-        self.published.take(kept);
-        self.begin();
-        Ok(())
-    }
-
-    /// Room for the same state in all three places.
-    fn fit(&mut self, state: &Linearisation) -> Result<()> {
-        self.current.fit(state)?;
-        self.published.fit(state)?;
-        self.made.fit(state)
-    }
-
     /// Takes the pattern of another near set.
     pub fn plan(&mut self, near: &NearSet, rest: &[f32]) -> Result<()> {
         let (elements, core) = (&near.elements, near.core);
@@ -108,8 +68,12 @@ impl NearFactor {
         self.points
             .extend(nodes.map(|at| [rest[at], rest[at + 1], rest[at + 2]]));
         self.targets.clear();
-        memory::fit(&mut self.targets, elements.len(), WHAT)?;
-        self.targets.resize(elements.len(), [NONE; 16]);
+        let is_core = |places: &[u32; 4]| places.iter().any(|place| (*place as usize) < core);
+        let count = elements.places().filter(is_core).count();
+        memory::fit(&mut self.targets, count, WHAT)?;
+        let all = (0..).zip(elements.places());
+        let own = all.filter(|(_, places)| is_core(places));
+        self.targets.extend(own.map(|(at, _)| (at, [NONE; 16])));
         self.fill_rows(near)?;
         let rows = &mut self.rows;
         rows.blocks.resize(rows.columns.len(), [0.0; 9]);
@@ -133,13 +97,14 @@ impl NearFactor {
         self.entries.clear();
         memory::fit(&mut self.entries, most, WHAT)?;
         self.entries.resize(most, NONE);
-        for (places, element) in near.elements.places().zip(0u32..) {
+        for ((element, _), at) in self.targets.iter().zip(0u32..) {
+            let places = near.elements.places_of(*element as usize);
             let corners = places.into_iter().zip(0..);
             for (row, corner) in corners.filter(|(row, _)| is_core(row)) {
                 // The start of a row moves to that of the next while it is filled.
-                let at = &mut rows.starts[row as usize];
-                self.entries[*at as usize] = 4 * element + corner;
-                *at += 1;
+                let start = &mut rows.starts[row as usize];
+                self.entries[*start as usize] = 4 * at + corner;
+                *start += 1;
             }
         }
         rows.columns.clear();
@@ -155,7 +120,8 @@ impl NearFactor {
             let first = rows.columns.len();
             rows.starts[row] = first as u32;
             for entry in own {
-                for column in near.elements.places_of(*entry as usize / 4) {
+                let element = self.targets[*entry as usize / 4].0;
+                for column in near.elements.places_of(element as usize) {
                     if let Some(at) = entry_of.get_mut(column as usize)
                         && *at == NONE
                     {
@@ -170,10 +136,11 @@ impl NearFactor {
                 entry_of[column as usize] = (first + at) as u32;
             }
             for entry in own {
-                let (element, corner) = (*entry as usize / 4, *entry as usize % 4);
-                let places = near.elements.places_of(element);
-                let targets = &mut self.targets[element][4 * corner..][..4];
-                for (target, column) in targets.iter_mut().zip(places) {
+                let (at, corner) = (*entry as usize / 4, *entry as usize % 4);
+                let (element, targets) = &mut self.targets[at];
+                let places = near.elements.places_of(*element as usize);
+                let own = targets[4 * corner..][..4].iter_mut();
+                for (target, column) in own.zip(places) {
                     *target = entry_of.get(column as usize).copied().unwrap_or(NONE);
                 }
             }
@@ -187,29 +154,44 @@ impl NearFactor {
         memory::fit(&mut rows.blocks, rows.columns.len(), WHAT)
     }
 
-    /// Makes the factor that serves a state `[K,3]`: that of the state where it was taken last, unless that is another's or has been deformed since.
-    pub fn renew(&mut self, env: Env<'_>, near: &NearSet, far: &FarField, u: &[f32]) -> Result<()> {
+    /// Makes the factor that serves a state `[K,3]`: that of the state `at` where it was taken last, unless that is another's or has been deformed since. `last` is the
+    /// number of the last factor that was made. Tells whether it is another state now.
+    pub fn renew(
+        &mut self,
+        (env, near, far): (Env<'_>, &NearSet, &FarField),
+        u: &[f32],
+        at: &mut Linearisation,
+        last: &mut u64,
+    ) -> Result<bool> {
         let _span = tracing::trace_span!("factor").entered();
         let kappa = env.time_step.integrator.kappa() as f32;
-        let serves = self.current.is_of(&near.centres, kappa)
-            && self.current.u.len() == 3 * near.nodes.len()
-            && self.change(near, u) <= MOST_CHANGE;
+        let serves = at.is_of(near.nodes.len(), kappa) && self.change(near, at, u) <= MOST_CHANGE;
         if !serves {
-            let near = (near.centres.as_slice(), near.nodes.as_slice());
-            self.current.set(near, kappa, u)?;
+            at.set(&near.nodes, kappa, u)?;
         }
-        // Taking it afterwards, and publishing it, cannot fail.
-        self.published.fit(&self.current)?;
-        self.made.fit(&self.current)?;
-        if self.made == self.current {
+        self.make((env, near, far), at, last)?;
+        Ok(!serves)
+    }
+
+    /// Makes the factor of the tangent at a state, unless it is that already.
+    pub fn make(
+        &mut self,
+        (env, near, far): (Env<'_>, &NearSet, &FarField),
+        at: &Linearisation,
+        last: &mut u64,
+    ) -> Result<()> {
+        // Taking it afterwards cannot fail.
+        self.made.fit(at)?;
+        if self.made == *at {
             return Ok(());
         }
         self.made.clear();
-        self.generation += 1;
+        *last += 1;
+        self.generation = *last;
         for (is_at_rest, more) in ATTEMPTS {
-            self.assemble(env, near, far, (is_at_rest, more));
+            self.assemble((env, near, far), at, (is_at_rest, more));
             if self.factor.factor(env.isa, &self.rows)? {
-                self.made.take(&self.current);
+                self.made.take(at);
                 return Ok(());
             }
         }
@@ -223,32 +205,27 @@ impl NearFactor {
     }
 
     /// How far the core's elements have been deformed since the tangent was taken: the largest change of an entry of F.
-    fn change(&self, near: &NearSet, u: &[f32]) -> f32 {
-        let before = self.current.u.as_chunks::<3>().0;
+    fn change(&self, near: &NearSet, at: &Linearisation, u: &[f32]) -> f32 {
+        let before = at.u.as_chunks::<3>().0;
         let moved = |place: u32| {
             let now = &u[3 * near.nodes[place as usize] as usize..][..3];
             [0, 1, 2].map(|axis| now[axis] - before[place as usize][axis])
         };
-        let elements = self.targets.iter().enumerate();
-        let core = elements.filter(|(_, targets)| **targets != [NONE; 16]);
-        let changes = core.map(|(at, _)| near.elements.largest_gradient(at, moved));
+        let core = self.targets.iter();
+        let changes = core.map(|(at, _)| near.elements.largest_gradient(*at as usize, moved));
         changes.fold(0.0, f32::max)
     }
 
     fn assemble(
         &mut self,
-        env: Env<'_>,
-        near: &NearSet,
-        far: &FarField,
+        (env, near, far): (Env<'_>, &NearSet, &FarField),
+        at: &Linearisation,
         (is_at_rest, more): (bool, f32),
     ) {
         self.rows.blocks.fill([0.0; 9]);
-        let u = self.current.u.as_chunks::<3>().0;
-        for (at, targets) in self.targets.iter().enumerate() {
-            if *targets == [NONE; 16] {
-                continue;
-            }
-            let (element, moduli) = near.elements.tetrahedron(at, far);
+        let (u, kappa) = (at.u.as_chunks::<3>().0, at.kappa);
+        for (at, targets) in &self.targets {
+            let (element, moduli) = near.elements.tetrahedron(*at as usize, far);
             let rest = element.deformation([[0.0; 3]; 4]);
             let moved = element
                 .corners
@@ -262,7 +239,7 @@ impl NearFactor {
             add(&mut self.rows.blocks, targets, &stiffness);
         }
         for (row, &node) in near.nodes[..near.core].iter().enumerate() {
-            let inertia = self.current.kappa * env.body.mass[node as usize];
+            let inertia = kappa * env.body.mass[node as usize];
             if let Some(own) = self.rows.position(row, row as u32) {
                 for axis in 0..3 {
                     let value = &mut self.rows.blocks[own][4 * axis];

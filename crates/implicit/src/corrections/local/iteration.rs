@@ -32,7 +32,7 @@ impl LocalSolver {
         // What of the change along the direction is linear is computed once here; each part `t` of it then costs the near elements alone.
         let stiff = &mut self.d.stiff;
         step.preconditioner.stiffen(env, &self.d.step.c, stiff)?;
-        (self.near).linear(env, &self.d.modes, None, &mut self.d.linear);
+        (self.set.near).linear(env, &self.d.modes, None, &mut self.d.linear);
         self.measure_direction(env);
         // Along a line the loads do not change, so their work is a constant of the slopes.
         let work = self.work(problem);
@@ -77,7 +77,7 @@ impl LocalSolver {
                     // Back to the forces and the state before; pairs and factor have led astray, and are forgotten.
                     problem.kept.undo(&mut problem.next);
                     self.pairs.clear();
-                    self.tangent.factor.clear();
+                    self.coming.clear_tangent();
                     return Ok(Gain::default());
                 }
             }
@@ -88,7 +88,7 @@ impl LocalSolver {
     fn descend(&mut self, step: &mut StepContext<'_>, problem: &ContactProblem) -> Result<()> {
         let env = step.context.env();
         self.residuals.reduced.take(&self.residuals.residual)?;
-        let (near, reduced) = (&self.near, &mut self.residuals.reduced);
+        let (near, reduced) = (&self.set.near, &mut self.residuals.reduced);
         each_load(problem, near, |place, force| {
             add(-1.0, &force, &mut reduced.r[place..])
         });
@@ -96,7 +96,7 @@ impl LocalSolver {
         // The two halves of L-BFGS, with the preconditioner where an initial matrix would stand.
         // Both halves change `reduced` and `d` in place: the first takes off it what the pairs know, the second adds that to the direction.
         let recursion = self.pairs.descend(env.isa, &mut self.residuals.reduced);
-        self.d.step.clear(&self.near)?;
+        self.d.step.clear(&self.set.near)?;
         self.precondition(step)?;
         self.pairs.ascend(env.isa, recursion, &mut self.d.step);
         self.decode_direction(step)
@@ -120,7 +120,7 @@ impl LocalSolver {
             return Ok(());
         }
         // On nodes without columns.
-        let (near, field) = (&self.near, &mut self.spare.room.field);
+        let (near, field) = (&self.set.near, &mut self.spare.room.field);
         resize(field, 3 * near.free)?;
         each_load(problem, near, |place, force| {
             let node = near.nodes[place / 3];
@@ -140,7 +140,7 @@ impl LocalSolver {
     fn precondition(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
         let preconditioner = &*step.preconditioner;
-        let (near, room) = (&self.near, &mut self.spare.room);
+        let (near, room) = (&self.set.near, &mut self.spare.room);
         // Places are sorted: core, other inside nodes, free border, held border. So `..core` is the core's part of any list by place.
         let core = 3 * near.core;
         // `B r` in the core, in place; the residual of the core becomes the move that balances it.
@@ -156,8 +156,8 @@ impl LocalSolver {
         let p = &mut self.residuals.reduced.p;
         resize(&mut room.field, 3 * near.free)?;
         room.field[..core].copy_from_slice(t);
-        self.tangent.factor.solve(env.isa, t);
-        self.tangent.factor.take_off(env, near, room, (t, p))?;
+        self.set.factor.solve(env.isa, t);
+        self.set.factor.take_off(env, near, room, (t, p))?;
         // `G^-1` of what is left to the modes once the core has moved.
         // `c = G^-1 (p - Phi^T K t)`: `take_off` has taken the core's move off `p`.
         preconditioner.respond_on_modes(env, p, &mut self.spare.solved)?;
@@ -167,8 +167,8 @@ impl LocalSolver {
         resize(&mut room.linear, 3 * near.nodes.len())?;
         near.decode(env, &room.q, &mut room.linear)?;
         // In the core the field that the move of the modes stretches over it takes its place.
-        self.tangent.factor.stretch(&room.linear, t);
-        self.tangent.factor.solve(env.isa, t);
+        self.set.factor.stretch(&room.linear, t);
+        self.set.factor.solve(env.isa, t);
         add(-1.0, t, &mut self.d.step.t);
         add(-1.0, &room.linear[..core], &mut self.d.step.t);
         Ok(())
@@ -193,13 +193,13 @@ impl LocalSolver {
         };
         // Columns are made as the contact asks for them, so the response changes while the problem reads it: hence the `RefCell`.
         let own = (
-            &mut self.tangent.factor,
-            &mut self.tangent.columns,
+            &mut self.set.factor,
+            &mut self.spare.columns,
             &mut self.spare.room,
         );
         let response = Response {
             env,
-            near: &self.near,
+            near: &self.set.near,
             preconditioner: step.preconditioner,
             own: RefCell::new(own),
         };
@@ -229,8 +229,8 @@ impl LocalSolver {
     /// Adds the response to `loads` to the direction.
     pub(super) fn respond(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
-        self.residuals.reduced.clear(&self.near)?;
-        let (near, reduced) = (&self.near, &mut self.residuals.reduced);
+        self.residuals.reduced.clear(&self.set.near)?;
+        let (near, reduced) = (&self.set.near, &mut self.residuals.reduced);
         for &(dof, force) in &self.spare.loads {
             let node = env.prior.contact_nodes[dof as usize / 3];
             if near.holds(node)
@@ -249,16 +249,16 @@ impl LocalSolver {
     /// `Phi c` of the direction at the near nodes.
     pub(super) fn decode_direction(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
-        let (ranges, q) = (&self.near.ranges, &mut self.spare.room.q);
+        let (ranges, q) = (&self.set.near.ranges, &mut self.spare.room.q);
         env.near_coordinates(&self.d.step.c, ranges, q);
-        self.near.decode(env, q, &mut self.d.modes)
+        self.set.near.decode(env, q, &mut self.d.modes)
     }
 
     /// Root mean square of the direction, weighted by mass.
     fn measure_direction(&mut self, env: Env<'_>) {
         let mut square = 0.0f64;
         let rows = self.d.step.t.as_chunks::<3>().0.iter();
-        for (t, &node) in rows.zip(&self.near.nodes) {
+        for (t, &node) in rows.zip(&self.set.near.nodes) {
             // Weighted by mass, so that a fine mesh near the tool counts no more than its volume does.
             let own: f32 = t.iter().map(|t| t * t).sum();
             square += f64::from(own) * f64::from(env.body.mass[node as usize]);
@@ -275,8 +275,8 @@ impl LocalSolver {
     /// Work of the tools' loads over the direction, nJ.
     fn work(&self, problem: &ContactProblem) -> f64 {
         let mut sum = 0.0f64;
-        let inside = 3 * self.near.inside;
-        each_load(problem, &self.near, |place, force| {
+        let inside = 3 * self.set.near.inside;
+        each_load(problem, &self.set.near, |place, force| {
             for (axis, force) in force.into_iter().enumerate() {
                 let at = place + axis;
                 // At border nodes only the modes move; at inside ones `t` besides.
@@ -305,7 +305,7 @@ impl LocalSolver {
         self.now.step.add(1.0, &self.d.step);
         // Before the pair is stored: `self.residuals.residual` is the new one from here on, and `reduced` still holds the change.
         std::mem::swap(&mut self.residuals.residual, &mut self.residuals.next);
-        let (near, room) = (&self.near, &mut self.spare.room);
+        let (near, room) = (&self.set.near, &mut self.spare.room);
         let pair = (&self.d.step, &self.residuals.reduced);
         (self.pairs).store(env, near, room, &self.reach.about, pair)
     }

@@ -44,7 +44,13 @@ impl LinearElements {
             shear: (moduli.shear_pa * element.volume) as f32,
             lambda: (lambda * element.volume) as f32,
         };
-        memory::push(&mut self.0, linear, WHAT)
+        // A large list, of a scene's own: its room grows by an eighth.
+        if self.0.len() == self.0.capacity() {
+            let more = (self.0.len() / 8).max(256);
+            memory::reserve(&mut self.0, more, WHAT)?;
+        }
+        self.0.push(linear);
+        Ok(())
     }
 
     /// Takes the places of the corners.
@@ -274,14 +280,6 @@ impl Parts {
     /// All parts, by cluster.
     pub fn iter(&self) -> impl Iterator<Item = &Part> + '_ {
         self.list.iter()
-    }
-
-    /// That of a cluster, where it has one.
-    pub fn of(&self, cluster: usize) -> Option<&Part> {
-        let at = self
-            .list
-            .binary_search_by_key(&cluster, |part| part.cluster);
-        at.ok().map(|at| &self.list[at])
     }
 
     /// The weights of a part: a place, and `sum_e v_e grad N` there.

@@ -17,6 +17,7 @@
 mod centres;
 mod clusters;
 mod columns;
+mod course;
 mod factor;
 mod iteration;
 mod linear;
@@ -24,28 +25,30 @@ mod linearisation;
 mod near;
 mod pairs;
 mod record;
+mod sets;
 mod state;
 mod step;
 
 use ::elements::Scratch;
 
 use self::clusters::Clusters;
-use self::columns::NearColumns;
-use self::factor::NearFactor;
+use self::course::{WHOLE, Wanted};
 use self::linear::WHAT;
-use self::near::NearSet;
+use self::near::{NearSet, level_of};
 use self::pairs::Pairs;
+use self::sets::{Coming, Set};
 use self::state::{Measured, Moved, Reach, Residuals, Spare};
 use self::step::{add, dot, resize};
+use super::far::FarField;
 use super::input::{Input, SolverContext};
 use super::passes::add_smoothed;
-use super::precondition::Preconditioner;
+use super::precondition::{Env, Preconditioner};
 use crate::contact::ContactProblem;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
 pub(super) use self::centres::add_centres;
-pub use self::linearisation::Linearisation;
+pub use self::course::Course;
 pub(super) use self::near::LEVELS;
 pub use self::record::Record;
 
@@ -78,20 +81,13 @@ pub(super) struct Gain {
     pub sunk_mm: f32,
 }
 
-/// The exact factor close to the tools, and the columns of the contact's compliance that it has made.
-#[derive(Default, HeldBytes)]
-pub(super) struct NearTangent {
-    pub factor: NearFactor,
-    columns: NearColumns,
-}
-
 /// A scene's own part.
 #[derive(HeldBytes)]
 pub struct LocalSolver {
-    near: NearSet,
+    set: Set,
+    pub(super) coming: Coming,
     pub(super) pairs: Pairs,
     clusters: Clusters,
-    pub(super) tangent: NearTangent,
     pub(super) reach: Reach,
     /// Since the base.
     now: Moved,
@@ -111,10 +107,10 @@ impl LocalSolver {
         let env = context.env();
         let (nodes, count) = (env.body.mass.len(), env.space.count());
         Ok(LocalSolver {
-            near: NearSet::new(env)?,
+            set: Set::new(env)?,
+            coming: Coming::default(),
             pairs: Pairs::new(count)?,
             clusters: Clusters::new(&context.corrections.far, count)?,
-            tangent: NearTangent::default(),
             reach: Reach::new()?,
             now: Moved::with_modes(count)?,
             d: Moved::with_modes(count)?,
@@ -158,34 +154,17 @@ impl LocalSolver {
             add_centres(rest, &group.nodes, &mut self.reach.about)?;
         }
         add_centres(rest, &self.reach.touched, &mut self.reach.about)?;
-        let pairs = &self.pairs;
-        let abouts = pairs.records().map(|record| record.about.as_slice());
-        let last = pairs
-            .records()
-            .last()
-            .map(|record| record.centres.as_slice());
-        self.near.choose(rest, last, &self.reach.about, abouts)?;
-        // A near set is dear to make (lists by element, the factor's pattern): it lasts as long as what is touched stays close to its centres.
-        if !self.near.is_chosen(self.reach.level) {
-            self.pairs.forget_layout();
-            self.near.fill(env, far, rest, self.reach.level)?;
-            let (near, room) = (&self.near, &mut self.spare.room);
-            (self.clusters).leave_out(env, far, near, room)?;
-            self.tangent.factor.plan(&self.near, rest)?;
-            self.near.finish();
-        }
-        (self.tangent.factor).renew(env, &self.near, far, base.u)?;
-        self.pairs.lay_out(env, &self.near, &mut self.spare.room)?;
-        self.now.clear(&self.near)?;
-        self.d.clear(&self.near)?;
-        self.residuals.residual.clear(&self.near)?;
-        resize(&mut self.residuals.base, 3 * self.near.free)?;
-        resize(&mut self.residuals.inner, 3 * self.near.free)?;
+        self.make_sets((env, far, rest), base.u)?;
+        self.now.clear(&self.set.near)?;
+        self.d.clear(&self.set.near)?;
+        self.residuals.residual.clear(&self.set.near)?;
+        resize(&mut self.residuals.base, 3 * self.set.near.free)?;
+        resize(&mut self.residuals.inner, 3 * self.set.near.free)?;
         // `p_0 = Phi^T r_0`: of the base, at all nodes.
         step.preconditioner.project(env, base.residual)?;
         let q = &step.preconditioner.coordinates;
         env.on_modes(q, &mut self.residuals.base_modes)?;
-        self.clusters.begin(far, &self.near, base.u);
+        self.clusters.begin(far, &self.set.near, base.u);
         // From here on `trial` is the base wherever no near node is: only near places are written in an iteration.
         self.residuals.trial.copy_from_slice(base.u);
         self.measured.far_det = f32::MAX;
@@ -200,38 +179,90 @@ impl LocalSolver {
         // Of a chunk that is near in part the far elements are looked at one by one where it is bad.
         let forces = &env.body.forces;
         let dets = step.scratch.smallest_by_chunk().iter().enumerate();
-        let far_dets = dets.map(|(chunk, &found)| match self.near.far_share[chunk] {
+        let far_dets = dets.map(|(chunk, &found)| match self.set.near.far_share[chunk] {
             1.0 => found,
             0.0 => f32::MAX,
             _ if found > LOOKED_AT_DET => f32::MAX,
-            _ => self.near.far_det(forces, chunk, base.u),
+            _ => self.set.near.far_det(forces, chunk, base.u),
         });
         self.measured.far_det = far_dets.fold(f32::MAX, f32::min);
         Ok(())
     }
 
+    /// Sees to it that a near set is in force about what the tools touch, with the factor of its tangent and the pairs laid out; takes the next one a part
+    /// further. `u [K,3]` is the state in which tangents are taken.
+    fn make_sets(
+        &mut self,
+        (env, far, rest): (Env<'_>, &FarField, &[f32]),
+        u: &[f32],
+    ) -> Result<()> {
+        let (coming, pairs) = (&mut self.coming, &mut self.pairs);
+        coming.about.clear();
+        add_centres(rest, &self.reach.about, &mut coming.about)?;
+        for record in pairs.records() {
+            add_centres(rest, &record.about, &mut coming.about)?;
+        }
+        coming.about.sort_unstable();
+        let wanted = Wanted {
+            rest,
+            about: &coming.about,
+            level: self.reach.level,
+            is_due: std::mem::take(&mut coming.is_due),
+        };
+        let level_of = |centres: &[u32], asked| level_of(far, rest, centres, asked);
+        let before = coming.course.now.level;
+        let is_other = coming.course.go_on(wanted, level_of)?;
+        let (now, room) = (&mut coming.course.now, &mut self.spare.room);
+        if now.level != before {
+            // What the pairs know of a narrower set is linear where the wider one is not.
+            pairs.clear();
+        }
+        if !(self.set.is_of(now) && self.set.near.made == WHOLE) {
+            pairs.forget_layout();
+            if let Some(other) = &mut coming.other
+                && other.is_of(now)
+            {
+                std::mem::swap(&mut self.set, other);
+            }
+            self.set.make((env, far, rest), now, room)?;
+            self.clusters.take(far, &self.set.left);
+        }
+        let Set { near, factor, .. } = &mut self.set;
+        let last = &mut coming.last_factor;
+        let is_new = factor.renew((env, near, far), u, &mut now.tangent, last)?;
+        pairs.lay_out(env, near, room)?;
+        // One dear thing a step.
+        if wanted.is_due && !is_other && !is_new {
+            coming.course.prepare(wanted, level_of)?;
+        }
+        coming.make_next((env, far, rest), u, room)?;
+        // So that publishing it cannot fail.
+        coming.published.fit(&coming.course)
+    }
+
     /// Another boundary holds the body: what is near is made anew, and the factor, by whose number others know its columns.
     pub(super) fn leave_boundary(&mut self) {
-        self.near.is_whole = false;
+        self.set.near.made = 0;
+        self.coming.forget();
     }
 
     /// Whether all nodes that the tools push are inside.
     pub(super) fn holds_loads(&self, problem: &ContactProblem, held: &[bool]) -> bool {
         let mut holds = true;
-        problem.each_load(|node, _| holds &= held[node as usize] || self.near.holds(node));
+        problem.each_load(|node, _| holds &= held[node as usize] || self.set.near.holds(node));
         holds
     }
 
     /// Whether a direction is not worth many tries: a leap's, of a body that is far in part. What inverts elements there leads into the tissue that the tool was
     /// put into, and not out of it.
     pub(super) fn is_dear(&self, problem: &ContactProblem) -> bool {
-        problem.ways.has_leapt && !self.near.is_all()
+        problem.ways.has_leapt && !self.set.near.is_all()
     }
 
     /// The level that the next step begins with, `u` being the state of this one.
     pub(super) fn next_level(&self, u: &[f32]) -> usize {
-        if self.reach.touched.is_empty() {
-            // What moves then is not what a tool pushes.
+        if self.reach.touched.is_empty() || self.coming.course.changes(self.reach.level) {
+            // What moves then is not what a tool pushes; or a wider set is on its way.
             return self.reach.level;
         }
         let u = u.as_chunks::<3>().0;
@@ -248,7 +279,7 @@ impl LocalSolver {
             &self.residuals.residual.r,
             WHAT,
         )?;
-        let (near, r) = (&self.near, &mut self.residuals.reduced.r);
+        let (near, r) = (&self.set.near, &mut self.residuals.reduced.r);
         each_load(problem, near, |place, force| {
             add(-1.0, &force, &mut r[place..])
         });
@@ -257,8 +288,8 @@ impl LocalSolver {
 
     /// Puts the near nodes at part `t` of the direction.
     fn place_at(&mut self, base: &[f32], t: f32) {
-        let inside = 3 * self.near.inside;
-        for (place, &node) in self.near.nodes[..self.near.free].iter().enumerate() {
+        let inside = 3 * self.set.near.inside;
+        for (place, &node) in self.set.near.nodes[..self.set.near.free].iter().enumerate() {
             for axis in 0..3 {
                 let (at, from) = (3 * place + axis, 3 * node as usize + axis);
                 let mut moved = self.now.modes[at];
@@ -276,8 +307,8 @@ impl LocalSolver {
     fn evaluate(&mut self, step: &mut StepContext<'_>, t: f32) -> Result<f32> {
         let env = step.context.env();
         let far = &step.context.corrections.far;
-        self.residuals.next.clear(&self.near)?;
-        let (near, inner) = (&mut self.near, &mut self.residuals.inner);
+        self.residuals.next.clear(&self.set.near)?;
+        let (near, inner) = (&mut self.set.near, &mut self.residuals.inner);
         let det = near.internal(&self.residuals.trial, inner);
         let kappa = env.time_step.integrator.kappa() as f32;
         let rows = inner.as_chunks_mut::<3>().0.iter_mut();
@@ -301,7 +332,7 @@ impl LocalSolver {
         }
         // `Phi^T` of what the near elements have added beyond the linear part, through the coordinates of the blocks that are near.
         let (near, q, p) = (
-            &self.near,
+            &self.set.near,
             &mut self.spare.room.q,
             &mut self.residuals.next.p,
         );
@@ -332,10 +363,10 @@ impl LocalSolver {
         preconditioner.take_coordinates(env, &self.now.step.c)?;
         preconditioner.decode(env, scratch)?;
         for (place, t) in self.now.step.t.as_chunks::<3>().0.iter().enumerate() {
-            let node = self.near.nodes[place] as usize;
+            let node = self.set.near.nodes[place] as usize;
             add(1.0, t, &mut scratch[3 * node..][..3]);
         }
-        let (near, count) = (&self.near, u.len() / 3);
+        let (near, count) = (&self.set.near, u.len() / 3);
         // Far nodes get the preconditioner's first level of the base's residual: a smoothing, for what the modes do not span.
         let fields = (residual, &mut *scratch, u);
         let moved = add_smoothed(

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use ::elements::{ElementForces, Subset};
 
-use super::centres::{add_centres, is_by, nearest_squared};
+use super::centres::{is_by, nearest_squared};
 use super::linear::{LinearElements, Parts, WHAT};
 use crate::corrections::far::FarField;
 use crate::corrections::precondition::Env;
@@ -29,10 +29,6 @@ const MOST_NODES: usize = 4500;
 /// Where a larger part of the nodes would be near, all are, and so they are in a body of fewer nodes: whole, it costs no more than its modes do.
 const LARGEST_PART: f32 = 0.5;
 const FEWEST_NODES: usize = 1000;
-/// A set goes on as long as what the tools touch lies that close to its centres, mm.
-const SLACK_MM: f32 = 5.0;
-/// A centre is left out that lies this far from all that is touched, mm.
-const LEFT_MM: f32 = 12.0;
 /// Nodes are of the core that lie this close to a centre at rest, mm, and as many mean edges.
 const CORE_MM: f32 = 20.0;
 const CORE_EDGES: f32 = 4.0;
@@ -44,9 +40,7 @@ const NONE: u32 = u32::MAX;
 /// What is near.
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct NearSet {
-    /// Centres, and those that the next filling will have.
     pub centres: Vec<u32>,
-    chosen: Vec<u32>,
     /// By chunk of the body: the share of its volume that is not near.
     pub far_share: Vec<f32>,
     pub nodes: Vec<u32>,
@@ -73,8 +67,8 @@ pub(in crate::corrections) struct NearSet {
     plan: RowPlan,
     /// Coordinates of the blocks that near nodes are of.
     pub ranges: Vec<Range<usize>>,
-    /// No error has left something half made.
-    pub(super) is_whole: bool,
+    /// How many of the parts that follow from the centres have been made for it.
+    pub(super) made: u32,
 }
 
 impl NearSet {
@@ -83,7 +77,6 @@ impl NearSet {
         let (count, chunks) = (env.body.mass.len(), env.body.forces.chunk_count());
         Ok(NearSet {
             centres: Vec::new(),
-            chosen: Vec::new(),
             far_share: memory::filled(chunks, 1.0, WHAT)?,
             nodes: Vec::new(),
             inside: 0,
@@ -100,7 +93,7 @@ impl NearSet {
             parts: Parts::default(),
             plan: RowPlan::try_region(&env.prior.basis(), &[], true)?,
             ranges: Vec::new(),
-            is_whole: false,
+            made: 0,
         })
     }
 
@@ -120,55 +113,28 @@ impl NearSet {
         (self.places[node as usize] as usize) < self.inside
     }
 
-    /// Chooses the centres: those of the last pair where they go on to serve, else what is touched, and about what older pairs were made.
-    pub fn choose<'a>(
+    /// Whether it is what lies about some centres, as far as a level reaches.
+    pub fn is_of(&self, centres: &[u32], level: usize) -> bool {
+        self.made > 0 && self.level == level && self.centres == centres
+    }
+
+    /// Takes the elements about some centres, as far as a level reaches.
+    pub fn fill(
         &mut self,
-        rest: &[f32],
-        last: Option<&[u32]>,
-        touched: &[u32],
-        abouts: impl Iterator<Item = &'a [u32]>,
+        (env, far, rest): (Env<'_>, &FarField, &[f32]),
+        centres: &[u32],
+        level: usize,
     ) -> Result<()> {
-        self.chosen.clear();
-        add_centres(rest, touched, &mut self.chosen)?;
-        for about in abouts {
-            add_centres(rest, about, &mut self.chosen)?;
-        }
-        self.chosen.sort_unstable();
-        // As long as the last pair's centres serve, they stay: a set that is filled anew costs as much as some iterations.
-        let Some(last) = last else {
-            return Ok(());
-        };
-        let serves = self
-            .chosen
-            .iter()
-            .all(|&node| is_by(rest, last, node, SLACK_MM))
-            && last
-                .iter()
-                .all(|&node| is_by(rest, &self.chosen, node, LEFT_MM));
-        match serves {
-            true => memory::replace(&mut self.chosen, last, WHAT),
-            false => Ok(()),
-        }
-    }
-
-    /// Whether what is near is what lies about the chosen centres.
-    pub fn is_chosen(&self, level: usize) -> bool {
-        self.is_whole && self.level == level && self.chosen == self.centres
-    }
-
-    /// All that depends on what is near has been made for it.
-    pub fn finish(&mut self) {
-        self.is_whole = true;
-    }
-
-    /// Takes the elements about the chosen centres, as far as a level reaches.
-    pub fn fill(&mut self, env: Env<'_>, far: &FarField, rest: &[f32], level: usize) -> Result<()> {
-        self.is_whole = false;
+        self.made = 0;
         self.level = level;
+        memory::replace(&mut self.centres, centres, WHAT)?;
         for &node in &self.nodes {
             self.places[node as usize] = NONE;
         }
-        let reach = self.reach(far, rest, level);
+        let reach = match self.places.len() < FEWEST_NODES {
+            true => f32::MAX,
+            false => reach(far, level),
+        };
         self.take_elements(env, far, rest, reach)?;
         // Where most nodes are near, all are: what the far ones save is less than their clusters cost.
         let most = LARGEST_PART * self.places.len() as f32;
@@ -206,21 +172,7 @@ impl NearSet {
             let ends = &basis.rank_offsets[block..block + 2];
             self.ranges.push(ends[0] as usize..ends[1] as usize);
         }
-        memory::replace(&mut self.centres, &self.chosen, WHAT)
-    }
-
-    /// How far from the chosen centres nodes are near, mm.
-    fn reach(&self, far: &FarField, rest: &[f32], level: usize) -> f32 {
-        if self.places.len() < FEWEST_NODES {
-            return f32::MAX;
-        }
-        let reach = |level: usize| WIDER[level] * REACH_MM.max(REACH_EDGES * far.edge_mm);
-        let fits = |level: &usize| {
-            let nodes = 0..self.places.len() as u32;
-            let near = nodes.filter(|node| is_by(rest, &self.chosen, *node, reach(*level)));
-            near.take(MOST_NODES + 1).count() <= MOST_NODES
-        };
-        reach((1..=level).rev().find(fits).unwrap_or(0))
+        Ok(())
     }
 
     /// Marks the nodes of the core as reached, and no others that are near.
@@ -228,7 +180,7 @@ impl NearSet {
         let mut reach = CORE_MM.min(CORE_EDGES * far.edge_mm);
         self.distances.clear();
         memory::fit(&mut self.distances, self.nodes.len(), WHAT)?;
-        let nearest = |node: &u32| nearest_squared(rest, &self.chosen, *node);
+        let nearest = |node: &u32| nearest_squared(rest, &self.centres, *node);
         self.distances.extend(self.nodes.iter().map(nearest));
         let within = |reach: f32| {
             let found = self.distances.iter().filter(|d| **d < reach * reach);
@@ -260,9 +212,9 @@ impl NearSet {
         self.is_near.resize(far.cluster_of.len(), false);
         self.subset.clear();
         let forces = &env.body.forces;
-        let is_reached = |node: u32| is_by(rest, &self.chosen, node, reach);
+        let is_reached = |node: u32| is_by(rest, &self.centres, node, reach);
         let is_by_box = |[low, high]: &[[f32; 3]; 2]| {
-            self.chosen.iter().any(|&node| {
+            self.centres.iter().any(|&node| {
                 let at = &rest[3 * node as usize..][..3];
                 let outside =
                     |axis: usize| (low[axis] - at[axis]).max(at[axis] - high[axis]).max(0.0);
@@ -387,6 +339,21 @@ impl NearSet {
         }
         Ok(())
     }
+}
+
+/// How far from the centres nodes are near, mm.
+fn reach(far: &FarField, level: usize) -> f32 {
+    WIDER[level] * REACH_MM.max(REACH_EDGES * far.edge_mm)
+}
+
+/// The widest level up to one that is asked for which has few enough nodes about some centres; the first has as many as it has.
+pub(super) fn level_of(far: &FarField, rest: &[f32], centres: &[u32], asked: usize) -> usize {
+    let fits = |level: &usize| {
+        let nodes = 0..(rest.len() / 3) as u32;
+        let near = nodes.filter(|node| is_by(rest, centres, *node, reach(far, *level)));
+        near.take(MOST_NODES + 1).count() <= MOST_NODES
+    };
+    (1..=asked).rev().find(fits).unwrap_or(0)
 }
 
 /// The level of the next step, whose set is wider where the far nodes are out of balance: they were smoothed by `far_mm`, the touched ones have

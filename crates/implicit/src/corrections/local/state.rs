@@ -3,6 +3,7 @@
 //! The base is a state whose residual is known at every node. Since then the near nodes have moved by `t + Phi c`; all that is
 //! linear in that move is carried along with it, so that a state along the direction costs the near elements alone.
 
+use super::columns::NearColumns;
 use super::linear::WHAT;
 use super::near::NearSet;
 use super::pairs::Room;
@@ -135,6 +136,7 @@ impl Reach {
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct Spare {
     pub room: Room,
+    pub(super) columns: NearColumns,
     /// Amplitudes of the modes `[r]`.
     pub on_modes: Vec<f32>,
     pub more_on_modes: Vec<f32>,
@@ -156,6 +158,7 @@ impl Spare {
                 q: memory::zeros(env.prior.width(), WHAT)?,
                 ..Room::default()
             },
+            columns: NearColumns::default(),
             on_modes: modes()?,
             more_on_modes: modes()?,
             solved: modes()?,

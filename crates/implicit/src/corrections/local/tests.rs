@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::path::Path;
 
+use super::centres::is_by;
 use super::columns::Response;
 use super::*;
 use crate::bundle::{BundleFiles, Mesh};
@@ -143,16 +144,16 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     let (_, u) = bench.smooth(&mut random, base_mm);
     let middle = bench.mesh.domain_nodes[bench.mesh.domain_nodes.len() / 2];
     let (local, mut step) = bench.begun(&input, &mut solver, &u, middle);
-    assert!(local.near.inside > 20 && local.near.nodes.len() < bench.mesh.node_count() / 2);
+    assert!(local.set.near.inside > 20 && local.set.near.nodes.len() < bench.mesh.node_count() / 2);
 
     let (c, _) = bench.smooth(&mut random, step_mm);
-    local.d.step.clear(&local.near).unwrap();
+    local.d.step.clear(&local.set.near).unwrap();
     local.d.step.c.copy_from_slice(&c);
-    local.d.step.t = random.normal(3 * local.near.inside, 0.05 * step_mm);
+    local.d.step.t = random.normal(3 * local.set.near.inside, 0.05 * step_mm);
     local.decode_direction(&mut step).unwrap();
     let stiff = &mut local.d.stiff;
     step.preconditioner.stiffen(env, &c, stiff).unwrap();
-    (local.near).linear(env, &local.d.modes, None, &mut local.d.linear);
+    (local.set.near).linear(env, &local.d.modes, None, &mut local.d.linear);
     local.place_at(&u, 1.0);
     local.evaluate(&mut step, 1.0).unwrap();
     let found = local.residuals.next.p.clone();
@@ -164,9 +165,9 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
         .settle(&mut step, &bench.zero, &mut scratch, &mut whole)
         .unwrap();
     let at_base = local.residuals.base_modes.clone();
-    let (near, r_found) = (local.near.nodes.clone(), local.residuals.next.r.clone());
+    let (near, r_found) = (local.set.near.nodes.clone(), local.residuals.next.r.clone());
     let before = local.residuals.base.clone();
-    let inside = local.near.inside;
+    let inside = local.set.near.inside;
     let (mut r, still) = (bench.zero.clone(), &bench.zero);
     let mut report = Report::default();
     solver
@@ -211,8 +212,8 @@ fn contact_has_the_compliance_of_the_preconditioner() {
     let (local, mut step) = bench.begun(&input, &mut solver, &u, nodes[nodes.len() / 2]);
     // Two in the core, two outside of it.
     let all = 0..nodes.len() as u32;
-    let place = |column: &u32| local.near.place(nodes[*column as usize]);
-    let (core, inside) = (local.near.core, local.near.inside);
+    let place = |column: &u32| local.set.near.place(nodes[*column as usize]);
+    let (core, inside) = (local.set.near.core, local.set.near.inside);
     let within = |from: usize, to: usize| {
         let is_there = move |column: &u32| place(column).is_some_and(|p| (from..to).contains(&p));
         all.clone().filter(is_there).take(2)
@@ -223,13 +224,13 @@ fn contact_has_the_compliance_of_the_preconditioner() {
     let order = 3 * columns.len();
     let mut upper = vec![0.0; order * order];
     let own = (
-        &mut local.tangent.factor,
-        &mut local.tangent.columns,
+        &mut local.set.factor,
+        &mut local.spare.columns,
         &mut local.spare.room,
     );
     let response = Response {
         env,
-        near: &local.near,
+        near: &local.set.near,
         preconditioner: step.preconditioner,
         own: RefCell::new(own),
     };
@@ -238,12 +239,12 @@ fn contact_has_the_compliance_of_the_preconditioner() {
     for from in 0..order {
         // The preconditioner's answer to 1 mN there, at all of them.
         local.spare.loads = vec![(3 * columns[from / 3] + (from % 3) as u32, 1.0)];
-        local.d.step.clear(&local.near).unwrap();
-        resize(&mut local.d.modes, 3 * local.near.nodes.len()).unwrap();
+        local.d.step.clear(&local.set.near).unwrap();
+        resize(&mut local.d.modes, 3 * local.set.near.nodes.len()).unwrap();
         local.respond(&mut step).unwrap();
         for to in 0..order {
             let node = nodes[columns[to / 3] as usize];
-            let at = 3 * local.near.place(node).unwrap() + to % 3;
+            let at = 3 * local.set.near.place(node).unwrap() + to % 3;
             let found = f64::from(local.d.step.t[at] + local.d.modes[at]);
             let wanted = upper[from.min(to) * order + from.max(to)];
             assert!(
@@ -252,4 +253,74 @@ fn contact_has_the_compliance_of_the_preconditioner() {
             );
         }
     }
+}
+
+/// What is near, and a solve of its factor.
+fn near_of(local: &mut LocalSolver) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
+    let Set { near, factor, .. } = &mut local.set;
+    let mut t = vec![1.0; 3 * near.core];
+    factor.solve(Isa::detect(), &mut t);
+    let bits = t.iter().map(|x| x.to_bits()).collect();
+    (near.centres.clone(), near.nodes.clone(), bits)
+}
+
+/// The next set takes a part a step and has the bits of one that is made at once, also where steps are made again or the solver is another one.
+#[test]
+fn the_next_set_comes_over_steps() {
+    let bench = Bench::open();
+    let (context, input) = (bench.context(), bench.input());
+    let (_, u) = bench.smooth(&mut Random::new(5), 2.0);
+    let base = Base {
+        u: &u,
+        residual: &bench.zero,
+    };
+    let rest = &bench.mesh.positions;
+    let domain = &bench.mesh.domain_nodes;
+    let first = domain[domain.len() / 2];
+    let at = |node: u32, from: f32, to: f32| {
+        !is_by(rest, &[first], node, from) && is_by(rest, &[first], node, to)
+    };
+    let within = |from, to| *domain.iter().find(|node| at(**node, from, to)).unwrap();
+    // Farther than a set may lie from what is touched, but not so far that it has to go at once; and farther than that.
+    let (second, third) = (within(5.5, 8.5), within(15.0, 30.0));
+    let mut solvers = [0, 1].map(|_| ImplicitSolver::new(context).unwrap());
+    let [solver, other] = &mut solvers;
+    let (local, mut step) = bench.begun(&input, solver, &u, first);
+    let at_first = near_of(local);
+    local.coming.commit();
+    local.reach.touched = vec![second];
+    let mut kept = Vec::new();
+    for parts in [1, 2, 0] {
+        kept.push(local.coming.copy().unwrap());
+        // Twice: the step is made again.
+        for _ in 0..2 {
+            local.coming.begin();
+            local.begin(&mut step, base).unwrap();
+            local.begin(&mut step, base).unwrap();
+            let is_at_first = near_of(local) == at_first;
+            assert_eq!(
+                (local.coming.course.next.parts, is_at_first),
+                (parts, parts > 0)
+            );
+        }
+        local.coming.commit();
+    }
+    let wanted = near_of(local);
+    assert_eq!(wanted.0, [second]);
+
+    // From what is kept after each of these steps, and without any set of before.
+    for (at, course) in kept.iter().enumerate() {
+        let (local, mut step) = bench.begun(&input, other, &u, third);
+        assert_eq!(near_of(local).0, [third]);
+        local.coming.restore(course).unwrap();
+        local.reach.touched = vec![second];
+        for _ in at..3 {
+            local.begin(&mut step, base).unwrap();
+            local.coming.commit();
+        }
+        assert_eq!(near_of(local), wanted, "from step {at}");
+        local.coming.restore(&Course::default()).unwrap();
+    }
+    let (local, _) = bench.begun(&input, other, &u, second);
+    assert_eq!(near_of(local), wanted, "at once");
 }
