@@ -5,16 +5,17 @@
 )]
 
 use crate::kernel::{
-    Eigenvalues, LaneTerms, Shape, Strain, add_forces, add_forces_of_stretches, add_volumes,
-    add_volumes_of_stretches, by_eigenvalues, relax,
+    Eigenvalues, LaneTerms, SecondLoop, Seconds, Shape, Strain, add_forces,
+    add_forces_of_stretches, add_volumes, add_volumes_of_stretches, by_eigenvalues, relax,
 };
-use crate::laws::{Isochoric, Law};
+use crate::laws::Law;
 use crate::partition::{Chunk, Partition};
 use crate::slots::{advance, place};
 use crate::stress_step::{SIX, StressStep};
 use lanes::{Isa, NodeLanes, WIDTH};
 
-type ForceKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]) -> f32;
+/// With `true` the pressure of an element comes from its nodes' dilatation, the fourth components of their positions.
+type ForceKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4], bool) -> f32;
 type VolumeKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]);
 /// Displacements by slot, and two rows of forces of which the second may be null.
 type RelaxKernel =
@@ -26,7 +27,6 @@ type AdvanceKernel = unsafe fn(usize, f32, *const [f32; 4], *mut [f32; 4], *mut 
 #[derive(Clone, Copy)]
 pub struct Kernels {
     pub forces: ForceKernel,
-    pub averaged_forces: ForceKernel,
     pub volumes: VolumeKernel,
     /// Takes a state into what a chunk's elements remember of their stresses ([`crate::StressHistory::pointers`]), and adds what that pushes with.
     pub relax: RelaxKernel,
@@ -36,38 +36,34 @@ pub struct Kernels {
 
 /// Forces of all clusters of a chunk; returns the smallest det F.
 #[inline(always)]
-unsafe fn all_forces<L: Eigenvalues, const AVERAGED: bool>(
+unsafe fn all_forces<L: Eigenvalues>(
     partition: &Partition,
     chunk: &Chunk,
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
+    averaged: bool,
 ) -> f32 {
     unsafe {
         let law = partition.moduli_of(chunk).law;
-        match (law, law.grows()) {
-            // One kernel for all of these: code is what a law costs those who do not use it.
-            (_, Some(grows)) => forces_by::<L, _, AVERAGED>(grows, partition, chunk, nodes, forces),
-            (Law::NeoHookean(law), _) => {
-                forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
+        match (law, Seconds::of(law)) {
+            (_, Some(laws)) => forces_by::<L, _>(laws, partition, chunk, nodes, forces, averaged),
+            (Law::NeoHookean(law), None) => {
+                forces_by::<L, _>(law, partition, chunk, nodes, forces, averaged)
             }
-            (Law::MooneyRivlin(law), _) => {
-                forces_by::<L, _, AVERAGED>(law, partition, chunk, nodes, forces)
-            }
-            (Law::Ogden(_) | Law::Yeoh(_) | Law::VerondaWestmann(_), None) => {
-                forces_by_stretches::<L, AVERAGED>(partition, chunk, nodes, forces)
-            }
+            (_, None) => forces_by_stretches::<L>(partition, chunk, nodes, forces, averaged),
         }
     }
 }
 
-/// The same by a law.
+/// The same by a law, or laws that share code: code is what a law costs those who do not use it.
 #[inline(always)]
-unsafe fn forces_by<L: NodeLanes, M: Isochoric, const AVERAGED: bool>(
+unsafe fn forces_by<L: NodeLanes, M: SecondLoop>(
     law: M,
     partition: &Partition,
     chunk: &Chunk,
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
+    averaged: bool,
 ) -> f32 {
     unsafe {
         let moduli = partition.moduli;
@@ -75,20 +71,21 @@ unsafe fn forces_by<L: NodeLanes, M: Isochoric, const AVERAGED: bool>(
         let (octahedra, pairs, singles) = partition.clusters(chunk);
         let mut shape = Shape::EMPTY;
         let shape = &mut shape;
-        let a = add_forces::<L, M, 6, 4, AVERAGED>(law, octahedra, nodes, forces, shape);
-        let b = add_forces::<L, M, 5, 2, AVERAGED>(law, pairs, nodes, forces, shape);
-        let c = add_forces::<L, M, 4, 1, AVERAGED>(law, singles, nodes, forces, shape);
+        let a = add_forces::<L, M, 6, 4>(law, averaged, octahedra, nodes, forces, shape);
+        let b = add_forces::<L, M, 5, 2>(law, averaged, pairs, nodes, forces, shape);
+        let c = add_forces::<L, M, 4, 1>(law, averaged, singles, nodes, forces, shape);
         a.min(b).min(c)
     }
 }
 
 /// The same by a law in principal stretches.
 #[inline(always)]
-unsafe fn forces_by_stretches<L: Eigenvalues, const AVERAGED: bool>(
+unsafe fn forces_by_stretches<L: Eigenvalues>(
     partition: &Partition,
     chunk: &Chunk,
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
+    averaged: bool,
 ) -> f32 {
     unsafe {
         let moduli = partition.moduli_of(chunk);
@@ -97,9 +94,9 @@ unsafe fn forces_by_stretches<L: Eigenvalues, const AVERAGED: bool>(
         let (of_octahedra, of_pairs, of_singles) = partition.gradients(chunk);
         let octahedra = (octahedra, of_octahedra);
         let (pairs, singles) = ((pairs, of_pairs), (singles, of_singles));
-        let a = add_forces_of_stretches::<L, 6, 4, AVERAGED>(law, octahedra, nodes, forces);
-        let b = add_forces_of_stretches::<L, 5, 2, AVERAGED>(law, pairs, nodes, forces);
-        let c = add_forces_of_stretches::<L, 4, 1, AVERAGED>(law, singles, nodes, forces);
+        let a = add_forces_of_stretches::<L, 6, 4>(law, averaged, octahedra, nodes, forces);
+        let b = add_forces_of_stretches::<L, 5, 2>(law, averaged, pairs, nodes, forces);
+        let c = add_forces_of_stretches::<L, 4, 1>(law, averaged, singles, nodes, forces);
         a.min(b).min(c)
     }
 }
@@ -161,9 +158,9 @@ unsafe fn all_histories<L: Eigenvalues>(
     }
 }
 
-/// Compiles the kernels for one `Lanes` type under the given target features.
+/// Compiles the kernels for one `Lanes` type, with [`Eigenvalues::APART`], under the given target features.
 macro_rules! kernels {
-    ($module:ident, $lanes:ty $(, $feature:literal)?) => {
+    ($module:ident, $lanes:ty, $apart:literal $(, $feature:literal)?) => {
         mod $module {
             use super::*;
 
@@ -173,18 +170,9 @@ macro_rules! kernels {
                 chunk: &Chunk,
                 n: *const [f32; 4],
                 f: *mut [f32; 4],
+                averaged: bool,
             ) -> f32 {
-                unsafe { all_forces::<$lanes, false>(p, chunk, n, f) }
-            }
-
-            $(#[target_feature(enable = $feature)])?
-            unsafe fn averaged_forces(
-                p: &Partition,
-                chunk: &Chunk,
-                n: *const [f32; 4],
-                f: *mut [f32; 4],
-            ) -> f32 {
-                unsafe { all_forces::<$lanes, true>(p, chunk, n, f) }
+                unsafe { all_forces::<$lanes>(p, chunk, n, f, averaged) }
             }
 
             $(#[target_feature(enable = $feature)])?
@@ -237,6 +225,8 @@ macro_rules! kernels {
             }
 
             impl Eigenvalues for $lanes {
+                const APART: bool = $apart;
+
                 #[inline(always)]
                 unsafe fn by_eigenvalues(law: &LaneTerms, strain: &Strain<Self>) -> [Self; 6] {
                     unsafe { deviator(law, strain) }
@@ -245,7 +235,6 @@ macro_rules! kernels {
 
             pub const KERNELS: Kernels = Kernels {
                 forces,
-                averaged_forces,
                 volumes,
                 relax: histories,
                 place: place_nodes,
@@ -257,21 +246,21 @@ macro_rules! kernels {
 
 // Eight lanes, as in the portable set: one code for both.
 #[cfg(any(not(target_family = "wasm"), feature = "scalar"))]
-kernels!(scalar, lanes::Scalar<8>);
+kernels!(scalar, lanes::Scalar<8>, true);
 #[cfg(target_arch = "x86_64")]
-kernels!(portable, lanes::Portable, "avx2,fma");
+kernels!(portable, lanes::Portable, false, "avx2,fma");
 #[cfg(target_arch = "aarch64")]
-kernels!(portable, lanes::Portable, "neon");
+kernels!(portable, lanes::Portable, false, "neon");
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-kernels!(portable, lanes::Portable);
+kernels!(portable, lanes::Portable, false);
 #[cfg(target_arch = "x86_64")]
-kernels!(avx2, lanes::Avx2, "avx2,fma");
+kernels!(avx2, lanes::Avx2, false, "avx2,fma");
 #[cfg(target_arch = "x86_64")]
-kernels!(avx512, lanes::Avx512, "avx512f,avx512vl,avx2,fma");
+kernels!(avx512, lanes::Avx512, false, "avx512f,avx512vl,avx2,fma");
 #[cfg(target_arch = "aarch64")]
-kernels!(neon, lanes::NeonFour, "neon");
+kernels!(neon, lanes::NeonFour, false, "neon");
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-kernels!(simd128, lanes::Simd128);
+kernels!(simd128, lanes::Simd128, false);
 
 impl Kernels {
     /// The kernels of `isa`; `None` where this processor lacks it.

@@ -166,7 +166,7 @@ impl ElementForces {
                 place(&self.partition, chunk, displacement, positions);
                 let own = forces.at(chunk.first);
                 std::ptr::write_bytes(own, 0, chunk.slot_count());
-                let det = (self.kernels.forces)(&self.partition, chunk, positions, own);
+                let det = (self.kernels.forces)(&self.partition, chunk, positions, own, false);
                 *smallest.at(index) = det;
             }
         });

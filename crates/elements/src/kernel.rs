@@ -39,7 +39,7 @@ use crate::laws::{Isochoric, Law};
 use forces::scatter;
 pub use gradients::{add_forces_of_stretches, add_volumes_of_stretches};
 use lanes::{NodeLanes, WIDTH, prefetch};
-use moduli::moduli;
+pub use moduli::{SecondLoop, Seconds};
 pub use relax::relax;
 pub use shape::Shape;
 use shape::{cross, dot, edges, load, shape};
@@ -82,17 +82,12 @@ fn flops_of_stretches(terms: usize, nodes: usize, tets: usize) -> usize {
 /// Adds the forces (µN) of the clusters to `forces`, given positions (mm, from any origin); returns the smallest det F
 /// seen.
 ///
-/// With `AVERAGED` the relative change of volume is the mean of the corners' fourth component
+/// Where `averaged`, the relative change of volume is the mean of the corners' fourth component
 /// instead of the element's `J - 1`. `law` comes with the material's bulk modulus over its shear modulus.
 #[inline(always)]
-pub unsafe fn add_forces<
-    L: NodeLanes,
-    M: Isochoric,
-    const NODES: usize,
-    const TETS: usize,
-    const AVERAGED: bool,
->(
-    law: (M, f32),
+pub unsafe fn add_forces<L: NodeLanes, M: SecondLoop, const NODES: usize, const TETS: usize>(
+    (law, bulk_over_shear): (M, f32),
+    averaged: bool,
     clusters: &[Cluster<NODES, TETS>],
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
@@ -102,18 +97,26 @@ pub unsafe fn add_forces<
         let mut smallest = L::splat(f32::MAX);
         for cluster in clusters {
             for first in (0..WIDTH).step_by(L::COUNT) {
-                shape::<L, M, NODES, TETS, AVERAGED>(cluster, first, nodes, buffer);
-            }
-            prefetch(std::ptr::from_ref(cluster).wrapping_add(1));
-            for tet in 0..TETS {
-                for first in (0..WIDTH).step_by(L::COUNT) {
-                    let ratio =
-                        moduli::<L, M, NODES, TETS, AVERAGED>(law, cluster, tet, first, buffer);
-                    smallest = ratio.min(smallest);
+                if M::SECOND {
+                    shape::<L, true, NODES, TETS>(cluster, first, nodes, averaged, buffer);
+                } else {
+                    shape::<L, false, NODES, TETS>(cluster, first, nodes, averaged, buffer);
                 }
             }
+            prefetch(std::ptr::from_ref(cluster).wrapping_add(1));
+            // Two loops, since a branch within one would keep its iterations from overlapping.
+            let least = if averaged {
+                law.moduli::<L, NODES, TETS, true>(bulk_over_shear, cluster, buffer)
+            } else {
+                law.moduli::<L, NODES, TETS, false>(bulk_over_shear, cluster, buffer)
+            };
+            smallest = least.min(smallest);
             for first in (0..WIDTH).step_by(L::COUNT) {
-                scatter::<L, M, NODES, TETS>(cluster, first, buffer, forces);
+                if M::SECOND {
+                    scatter::<L, true, NODES, TETS>(cluster, first, buffer, forces);
+                } else {
+                    scatter::<L, false, NODES, TETS>(cluster, first, buffer, forces);
+                }
             }
         }
         let mut lanes = [f32::MAX; WIDTH];

@@ -212,7 +212,7 @@ impl Subset {
             let own = unsafe {
                 place(partition, chunk, displacement, positions);
                 std::ptr::write_bytes(forces, 0, count);
-                let det = (self.kernels.forces)(partition, chunk, positions, forces);
+                let det = (self.kernels.forces)(partition, chunk, positions, forces, false);
                 smallest = smallest.min(det);
                 std::slice::from_raw_parts(forces, count)
             };

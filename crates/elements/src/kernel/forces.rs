@@ -2,14 +2,13 @@
 
 use super::shape::{Shape, load};
 use crate::cluster::{Cluster, corners};
-use crate::laws::Isochoric;
 use lanes::NodeLanes;
 
 /// Adds a spring to a sum: the stored one times its factor, or one that the law has made anew.
 #[inline(always)]
-unsafe fn add_spring<L: NodeLanes, M: Isochoric>(factor: L, spring: L, sum: L) -> L {
+unsafe fn add_spring<L: NodeLanes, const SECOND: bool>(factor: L, spring: L, sum: L) -> L {
     unsafe {
-        if M::SECOND {
+        if SECOND {
             sum.add(spring)
         } else {
             factor.mul_add(spring, sum)
@@ -30,7 +29,12 @@ struct Pull<L, const NODES: usize, const TETS: usize> {
 
 /// Adds the forces to the nodes.
 #[inline(always)]
-pub(super) unsafe fn scatter<L: NodeLanes, M: Isochoric, const NODES: usize, const TETS: usize>(
+pub(super) unsafe fn scatter<
+    L: NodeLanes,
+    const SECOND: bool,
+    const NODES: usize,
+    const TETS: usize,
+>(
     cluster: &Cluster<NODES, TETS>,
     first: usize,
     shape: &Shape,
@@ -47,18 +51,18 @@ pub(super) unsafe fn scatter<L: NodeLanes, M: Isochoric, const NODES: usize, con
         for tet in 0..TETS {
             let [_, b, c] = corners::<NODES>(tet);
             let by = load::<L>(&shape.determinant[tet], first);
-            let m = if M::SECOND {
+            let m = if SECOND {
                 &shape.products[tet]
             } else {
                 &cluster.springs[tet]
             };
-            pull.own[1] = add_spring::<L, M>(by, load(&m[0], first), pull.own[1]);
-            pull.along[b] = add_spring::<L, M>(by, load(&m[1], first), pull.along[b]);
-            pull.along[c] = add_spring::<L, M>(by, load(&m[2], first), pull.along[c]);
-            pull.own[b] = add_spring::<L, M>(by, load(&m[3], first), pull.own[b]);
-            pull.own[c] = add_spring::<L, M>(by, load(&m[5], first), pull.own[c]);
+            pull.own[1] = add_spring::<L, SECOND>(by, load(&m[0], first), pull.own[1]);
+            pull.along[b] = add_spring::<L, SECOND>(by, load(&m[1], first), pull.along[b]);
+            pull.along[c] = add_spring::<L, SECOND>(by, load(&m[2], first), pull.along[c]);
+            pull.own[b] = add_spring::<L, SECOND>(by, load(&m[3], first), pull.own[b]);
+            pull.own[c] = add_spring::<L, SECOND>(by, load(&m[5], first), pull.own[c]);
             let face = load::<L>(&m[4], first);
-            pull.face[tet] = if M::SECOND { face } else { by.mul(face) };
+            pull.face[tet] = if SECOND { face } else { by.mul(face) };
             pull.factor[tet] = load(&shape.invariant[tet], first);
         }
         // The forces of an element are in balance: what the other nodes get is taken from node 0.

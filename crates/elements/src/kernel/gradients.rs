@@ -72,16 +72,12 @@ pub(super) unsafe fn of_corners<L: NodeLanes, const NODES: usize>(
     [edge[a], edge[b], edge[c]]
 }
 
-/// Adds the forces (µN) of the clusters to `forces`, given displacements (mm); returns the smallest det F. `AVERAGED` as for
+/// Adds the forces (µN) of the clusters to `forces`, given displacements (mm); returns the smallest det F. `averaged` as for
 /// [`super::add_forces`].
 #[inline(always)]
-pub unsafe fn add_forces_of_stretches<
-    L: Eigenvalues,
-    const NODES: usize,
-    const TETS: usize,
-    const AVERAGED: bool,
->(
+pub unsafe fn add_forces_of_stretches<L: Eigenvalues, const NODES: usize, const TETS: usize>(
     law: &LaneTerms,
+    averaged: bool,
     (clusters, gradients): (&[Cluster<NODES, TETS>], &[Gradients<TETS>]),
     nodes: *const [f32; 4],
     forces: *mut [f32; 4],
@@ -92,6 +88,14 @@ pub unsafe fn add_forces_of_stretches<
         for (cluster, gradients) in clusters.iter().zip(gradients) {
             for first in (0..WIDTH).step_by(L::COUNT) {
                 let (edge, fourth) = edges::<L, NODES, TETS>(cluster, first, nodes);
+                let mut mean = [zero; TETS];
+                if averaged {
+                    for tet in 0..TETS {
+                        let [a, b, c] = corners::<NODES>(tet);
+                        let sum = fourth[0].add(fourth[a]).add(fourth[b]).add(fourth[c]);
+                        mean[tet] = sum.mul(L::splat(0.25));
+                    }
+                }
                 let mut force = [[zero; 3]; NODES];
                 for tet in 0..TETS {
                     let [a, b, c] = corners::<NODES>(tet);
@@ -105,12 +109,7 @@ pub unsafe fn add_forces_of_stretches<
                         det.min(L::splat(-LEAST_DET)),
                         det.max(L::splat(LEAST_DET)),
                     );
-                    let dilatation = if AVERAGED {
-                        let sum = fourth[0].add(fourth[a]).add(fourth[b]).add(fourth[c]);
-                        sum.mul(L::splat(0.25))
-                    } else {
-                        change
-                    };
+                    let dilatation = if averaged { mean[tet] } else { change };
                     // Both with the sign of a force on the tissue, and the volume.
                     let volume = zero.sub(load::<L>(&gradients.volume[tet], first));
                     let scale = volume.div(bounded);

@@ -2,8 +2,8 @@
 
 use super::shape::{Shape, load, store};
 use crate::cluster::Cluster;
-use crate::laws::Isochoric;
-use lanes::NodeLanes;
+use crate::laws::{Grows, Isochoric, Law, MooneyRivlin};
+use lanes::{NodeLanes, WIDTH};
 
 /// `x^(-1/3)` for positive `x`, relative error about 1e-7.
 #[inline(always)]
@@ -25,9 +25,96 @@ pub(super) unsafe fn inverse_cube_root<L: NodeLanes>(x: L) -> L {
 /// Where row `j`, column `k` of a symmetric matrix is in the order of [`Cluster::springs`].
 const ENTRY: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
+/// What the second loop is made of: a law, or one of several.
+pub trait SecondLoop: Copy {
+    /// As of [`Isochoric`].
+    const SECOND: bool;
+
+    /// The loop over a batch; returns the smallest det F in each lane.
+    unsafe fn moduli<L: NodeLanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
+        self,
+        bulk_over_shear: f32,
+        cluster: &Cluster<NODES, TETS>,
+        shape: &mut Shape,
+    ) -> L;
+}
+
+impl<M: Isochoric> SecondLoop for M {
+    const SECOND: bool = M::SECOND;
+
+    #[inline(always)]
+    unsafe fn moduli<L: NodeLanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
+        self,
+        bulk_over_shear: f32,
+        cluster: &Cluster<NODES, TETS>,
+        shape: &mut Shape,
+    ) -> L {
+        unsafe {
+            let mut smallest = L::splat(f32::MAX);
+            for tet in 0..TETS {
+                for first in (0..WIDTH).step_by(L::COUNT) {
+                    let law = (self, bulk_over_shear);
+                    let ratio =
+                        moduli::<L, M, NODES, TETS, AVERAGED>(law, cluster, tet, first, shape);
+                    smallest = ratio.min(smallest);
+                }
+            }
+            smallest
+        }
+    }
+}
+
+/// Laws with `I2`: the first and the third loop are the same code.
+#[derive(Clone, Copy)]
+pub enum Seconds {
+    MooneyRivlin(MooneyRivlin),
+    Grows(Grows),
+}
+
+impl Seconds {
+    /// `law`, where its kernel is one of these.
+    pub fn of(law: Law) -> Option<Self> {
+        match law {
+            Law::NeoHookean(_) | Law::Ogden(_) => None,
+            Law::MooneyRivlin(law) => Some(Self::MooneyRivlin(law)),
+            Law::Yeoh(law) => Some(Self::Grows(Grows::Yeoh(law))),
+            Law::VerondaWestmann(law) => Some(Self::Grows(Grows::VerondaWestmann(law))),
+        }
+    }
+}
+
+impl SecondLoop for Seconds {
+    const SECOND: bool = true;
+
+    #[inline(always)]
+    unsafe fn moduli<L: NodeLanes, const NODES: usize, const TETS: usize, const AVERAGED: bool>(
+        self,
+        bulk_over_shear: f32,
+        cluster: &Cluster<NODES, TETS>,
+        shape: &mut Shape,
+    ) -> L {
+        unsafe {
+            match self {
+                Self::MooneyRivlin(law) => SecondLoop::moduli::<L, NODES, TETS, AVERAGED>(
+                    law,
+                    bulk_over_shear,
+                    cluster,
+                    shape,
+                ),
+                Self::Grows(law) => SecondLoop::moduli::<L, NODES, TETS, AVERAGED>(
+                    law,
+                    bulk_over_shear,
+                    cluster,
+                    shape,
+                ),
+            }
+        }
+    }
+}
+
 /// Turns determinant, invariant and products into the factors of springs and pressure; returns det F.
 #[inline(always)]
-pub(super) unsafe fn moduli<
+unsafe fn moduli<
     L: NodeLanes,
     M: Isochoric,
     const NODES: usize,

@@ -1,7 +1,6 @@
 //! The first loop of a batch: nodes gathered, and what the edges of its tetrahedra have between them.
 
 use crate::cluster::{Cluster, corners};
-use crate::laws::Isochoric;
 use lanes::{NodeLanes, WIDTH};
 
 /// A vector of 16 elements.
@@ -96,23 +95,30 @@ pub(super) unsafe fn edges<L: NodeLanes, const NODES: usize, const TETS: usize>(
     }
 }
 
-/// Gathers the nodes and fills `out`.
+/// Gathers the nodes and fills `out`: its `products` of a law with `I2`, its `dilatation` where the nodes' is `averaged`.
 #[inline(always)]
 pub(super) unsafe fn shape<
     L: NodeLanes,
-    M: Isochoric,
+    const SECOND: bool,
     const NODES: usize,
     const TETS: usize,
-    const AVERAGED: bool,
 >(
     cluster: &Cluster<NODES, TETS>,
     first: usize,
     nodes: *const [f32; 4],
+    averaged: bool,
     out: &mut Shape,
 ) {
     unsafe {
         let zero = L::splat(0.0);
         let (edge, fourth) = edges::<L, NODES, TETS>(cluster, first, nodes);
+        if averaged {
+            for tet in 0..TETS {
+                let [_, b, c] = corners::<NODES>(tet);
+                let sum = fourth[0].add(fourth[1]).add(fourth[b]).add(fourth[c]);
+                store(sum, &mut out.dilatation[tet], first);
+            }
+        }
         let mut square = [zero; NODES];
         let mut along = [zero; NODES];
         for k in 1..NODES {
@@ -130,7 +136,7 @@ pub(super) unsafe fn shape<
             store(dot(edge[1], face), &mut out.determinant[tet], first);
             let m = &cluster.springs[tet];
             let between = dot(edge[b], edge[c]);
-            if M::SECOND {
+            if SECOND {
                 let products = [square[1], along[b], along[c], square[b], between, square[c]];
                 for k in 0..6 {
                     store(products[k], &mut out.products[tet][k], first);
@@ -144,10 +150,6 @@ pub(super) unsafe fn shape<
             let own = load::<L>(&m[0], first).mul_add(square[1], own);
             let invariant = mixed.mul_add(L::splat(2.0), own);
             store(invariant, &mut out.invariant[tet], first);
-            if AVERAGED {
-                let sum = fourth[0].add(fourth[1]).add(fourth[b]).add(fourth[c]);
-                store(sum, &mut out.dilatation[tet], first);
-            }
         }
     }
 }

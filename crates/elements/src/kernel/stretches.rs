@@ -172,12 +172,32 @@ unsafe fn scalar_power<L: NodeLanes>(x: L, n: u32) -> L {
 /// # Safety
 /// As [`NodeLanes`].
 pub trait Eigenvalues: NodeLanes {
+    /// Whether [`deviator`] is one function, too: lanes for which its code is long, and a call nothing.
+    const APART: bool;
+
     unsafe fn by_eigenvalues(law: &LaneTerms, strain: &Strain<Self>) -> [Self; 6];
 }
 
 /// `T`, Pa.
 #[inline(always)]
 pub unsafe fn deviator<L: Eigenvalues>(law: &LaneTerms, strain: &Strain<L>) -> [L; 6] {
+    unsafe {
+        if L::APART {
+            deviator_apart(law, strain)
+        } else {
+            deviator_within(law, strain)
+        }
+    }
+}
+
+/// Not for lanes of an instruction set: as a function of its own it would not be compiled for that.
+#[inline(never)]
+unsafe fn deviator_apart<L: Eigenvalues>(law: &LaneTerms, strain: &Strain<L>) -> [L; 6] {
+    unsafe { deviator_within(law, strain) }
+}
+
+#[inline(always)]
+unsafe fn deviator_within<L: Eigenvalues>(law: &LaneTerms, strain: &Strain<L>) -> [L; 6] {
     unsafe {
         if let Some(grows) = law.grows {
             let both = [&strain.d, &strain.square];

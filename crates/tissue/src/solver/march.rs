@@ -225,16 +225,12 @@ impl March<'_> {
             for index in mine {
                 let chunk = &self.partition.chunks[index];
                 self.prepare(shared, chunk, positions);
-                let kernel = if self.averaged {
-                    self.kernels.averaged_forces
-                } else {
-                    self.kernels.forces
-                };
-                let smallest = kernel(
+                let smallest = (self.kernels.forces)(
                     self.partition,
                     chunk,
                     positions.as_ptr().cast(),
                     shared.force.add(chunk.first).cast(),
+                    self.averaged,
                 );
                 let tally = &mut *shared.tallies.add(index);
                 if smallest <= 0.0 && tally.inverted_at == 0 {
