@@ -5,14 +5,16 @@
     python tests/docs/results.py ages                            # which figures are older than the code they measure
 
 Commands write Markdown between marks of their own. `run` gives them a page with the marks and tables of data/NAME.json
-(`{page}` is its path, target/results/NAME.md), and keeps what changed, with the command, machine, date and commit, and
-images that it left in target/results/images. New files begin with `--mark "LINE" "LINE"`, that the command looks for.
+(`{page}` is its path, target/results/NAME.md), and keeps what the command wrote, with the command, machine, date and
+commit, and images that it left in target/results/images. New files begin with `--mark "LINE" "LINE"`, that the command
+looks for.
 
 A page shows a table behind `<!-- results: NAME NUMBER | COLUMN; COLUMN | COLUMN = VALUE -->`, to the next empty line;
 tables are counted from 1. `NAME said NUMBER ...` are the sentences before tables, `NAME after NUMBER ...` those at the
 end of blocks; `step-times` is the table of step_times.py. Columns and the condition on rows (`~`: a regular expression)
 may be left out; a column without a title is `row`. Behind `<!-- results: ages -->` a page says which of its figures are
-older than the code that they measure: a measurement keeps the hashes of that code (`inputs`). The docs stage checks
+older than the code that they measure: a measurement keeps the hashes of that code (`inputs`), in which comments and
+tests do not count. The docs stage checks
 that pages are what their data make them, and that a page names every file; that no figure has become old unsaid is
 checked where UPT_NIGHTLY is set, since each change of the code makes figures old.
 """
@@ -29,6 +31,7 @@ import sys
 from datetime import date
 from pathlib import Path
 
+import code_hash
 import step_times
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,6 +39,8 @@ PAGES = ROOT / "docs/results"
 DATA = PAGES / "data"
 MARK = re.compile(r"^<!-- results: (?P<what>.*?) -->\n(?:(?!<!--).+\n)*", re.MULTILINE)
 MEASURED = ("src", "crates", "onnx")
+#: Behind what a command finds between its marks: where it is gone, the command has measured anew, the same figures too.
+UNTOUCHED = "<!-- as it was -->\n"
 
 
 def git(*words: str) -> str:
@@ -45,8 +50,8 @@ def git(*words: str) -> str:
 
 
 def inputs(measured: list[str]) -> dict[str, str]:
-    """Hashes of the code that a measurement measures, as it is committed."""
-    return {path: git("rev-parse", f"HEAD:{path}") for path in measured}
+    """Hashes of the code that a measurement measures, as it is committed: without comments and tests (code_hash.py)."""
+    return {path: code_hash.of(path) for path in measured}
 
 
 def is_old(block: dict) -> bool:
@@ -135,7 +140,7 @@ def run(options: argparse.Namespace) -> None:
     page = ROOT / f"target/results/{options.name}.md"
     (page.parent / "images").mkdir(parents=True, exist_ok=True)
     page.write_text(
-        "".join(f"{block['begin']}\n{written(block)}{block['end']}\n" for block in blocks), encoding="utf-8"
+        "".join(f"{block['begin']}\n{written(block)}{UNTOUCHED}{block['end']}\n" for block in blocks), encoding="utf-8"
     )
     command = [word.replace("{page}", str(page)) for word in options.command]
     subprocess.run(command, cwd=ROOT, check=True)
@@ -144,8 +149,8 @@ def run(options: argparse.Namespace) -> None:
     text = page.read_text(encoding="utf-8")
     for block in blocks:
         inside = text.split(f"{block['begin']}\n", 1)[1].split(block["end"], 1)[0]
-        new = parsed(inside)
-        if any(new[key] != block[key] for key in new):
+        new = parsed(inside.replace(UNTOUCHED, ""))
+        if UNTOUCHED not in inside or any(new[key] != block[key] for key in new):
             block |= new | {
                 "command": " ".join(options.command),
                 "machine": processor(),
@@ -228,7 +233,7 @@ def compared(text: str) -> str:
 
 def faults() -> list[str]:
     """Pages that are not what the data make them, and files that no page names."""
-    found = step_times.faults(ROOT / "README.md", read)
+    found = code_hash.faults() + step_times.faults(ROOT / "README.md", read)
     text = ""
     for page in pages():
         fresh = shown(page, found)
