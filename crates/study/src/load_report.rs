@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, ensure};
 use contact::{Body, Pose, Vector, pose};
 use serde::Serialize;
-use tissue::load_programmes::LoadProgramme;
+use tissue::load_programmes::{LoadProgramme, LoadSizes};
 use tissue::simulate::{ToolOrder, simulate_loads, simulate_tools};
 use tissue::solver::SupportMotion;
 use tissue::trajectory::Trajectory;
@@ -43,10 +43,15 @@ struct Row {
 
 /// Measures and prints the table.
 pub fn report(asked: &Options) -> Result<ExitCode> {
-    let mark = match asked.tool {
-        None => "study report --load".to_owned(),
-        Some(tool) => format!("study report --load --tool {}", tool.name()),
-    };
+    let mut mark = "study report --load".to_owned();
+    if let Some(tool) = asked.tool {
+        mark += &format!(" --tool {}", tool.name());
+    }
+    let sizes = asked.load_sizes.sizes();
+    if sizes != LoadSizes::default() {
+        let ([x, y, z], pascal) = (sizes.gravity_m_s2, sizes.pascal);
+        mark += &format!(" --gravity {x},{y},{z} --pressure {pascal}");
+    }
     beside::report(asked, &mark, (&[0, 1, 2], &COLUMNS), |subject| {
         let mut rows = Vec::new();
         for programme in &asked.load {

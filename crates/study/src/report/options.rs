@@ -61,7 +61,8 @@ pub struct Options {
     #[arg(long, value_name = "FILE")]
     pub markdown: Vec<PathBuf>,
     /// Measure programmes of loads (tilt, pulse, sag, breathe) in the bundles of --bundle against the reference solver, which runs here. --markdown replaces the
-    /// part between the markers `study report --load`, with `--tool NAME` behind where a tool touches.
+    /// part between the markers `study report --load`, with `--tool NAME` behind where a tool touches and `--gravity X,Y,Z --pressure PA` behind that where they
+    /// are not the defaults.
     #[arg(long, value_delimiter = ',', conflicts_with_all = ["trajectories", "data", "tools"])]
     pub load: Vec<LoadProgramme>,
     /// Measure so many cases of a bed of ties that a thread tears node by node, in the bundles of --bundle against the reference solver, which runs here. --markdown
