@@ -63,7 +63,7 @@ pub struct Preconditioner {
     nodes: Vec<u32>,
     /// The factors are of `nodes`.
     ready: bool,
-    whole: WholeLevel,
+    pub(super) whole: WholeLevel,
 }
 
 impl Preconditioner {

@@ -199,6 +199,8 @@ pub(super) struct WholeSolve {
     schur: ContactFactor,
     work: Vec<f32>,
     amounts: Vec<f32>,
+    /// `V'` at some nodes, spread over all: by degree of freedom, then mode; empty where nobody has asked.
+    sampled: Vec<f32>,
     partial: PartialSums,
 }
 
@@ -253,6 +255,7 @@ impl WholeSolve {
             schur,
             work: memory::zeros(own, WHAT)?,
             amounts: memory::zeros(own, WHAT)?,
+            sampled: Vec::new(),
             partial: PartialSums::with_room(len, AT_ONCE)?,
         })
     }
@@ -265,6 +268,13 @@ impl WholeSolve {
         r: &[f32],
         on_modes: &[f32],
     ) -> Result<()> {
+        self.project(compute, modes, r)?;
+        self.finish(compute, on_modes);
+        Ok(())
+    }
+
+    /// `V^T r`, to be finished.
+    pub fn project(&mut self, compute: Compute<'_>, modes: &WholeModes, r: &[f32]) -> Result<()> {
         // Copies of nodes lie behind the body's own: they have the values of their parents in each mode.
         let (r, copies) = r.split_at(modes.len());
         let mut views = [r; AT_ONCE];
@@ -293,6 +303,23 @@ impl WholeSolve {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Takes a force on a node, µN, off the residual that has been projected.
+    pub fn take_force(&mut self, modes: &WholeModes, node: u32, force: [f32; 3]) {
+        let at = match (3 * node as usize).checked_sub(modes.len()) {
+            Some(copy) => 3 * modes.parents[copy / 3] as usize,
+            None => 3 * node as usize,
+        };
+        let fields = modes.fields.chunks_exact(modes.len());
+        for (work, field) in self.work.iter_mut().zip(fields) {
+            *work -= (0..3).map(|k| force[k] * field[at + k]).sum::<f32>();
+        }
+    }
+
+    /// `S^-1 V'^T r` from what has been projected and `Phi^T r`.
+    pub fn finish(&mut self, compute: Compute<'_>, on_modes: &[f32]) {
         // `V' = V - Phi X`: what `V` has of the modes is theirs.
         for (row, on_mode) in self.cross.chunks_exact(self.rows.len()).zip(on_modes) {
             for (work, x) in self.work.iter_mut().zip(row) {
@@ -300,7 +327,37 @@ impl WholeSolve {
             }
         }
         self.schur.solve(compute.isa, &self.work, &mut self.amounts);
-        Ok(())
+    }
+
+    /// The amounts of one of `V'` alone.
+    pub fn pick(&mut self, mode: usize) {
+        self.amounts.fill(0.0);
+        self.amounts[mode] = 1.0;
+    }
+
+    /// What a residual asks for leads up: its opposite.
+    pub fn turn(&mut self) {
+        self.amounts
+            .iter_mut()
+            .for_each(|amount| *amount = -*amount);
+    }
+
+    /// `V'` at the sampled nodes, for who makes it.
+    pub fn sampled(&mut self) -> &mut Vec<f32> {
+        &mut self.sampled
+    }
+
+    /// How far the amounts of the last solve move a sampled node along an axis, at most, mm; without bounds where there are none.
+    pub fn most_mm(&self) -> f32 {
+        let rows = self.sampled.chunks_exact(self.amounts.len().max(1));
+        let moves = rows.map(|row| {
+            let products = row.iter().zip(&self.amounts);
+            products.map(|(v, amount)| v * amount).sum::<f32>().abs()
+        });
+        match self.sampled.is_empty() {
+            true => f32::INFINITY,
+            false => moves.fold(0.0, f32::max),
+        }
     }
 
     /// Takes what `V'` has of the modes `Phi` in the last solve off their amounts.

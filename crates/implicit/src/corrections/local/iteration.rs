@@ -135,6 +135,26 @@ impl LocalSolver {
         Ok(())
     }
 
+    /// `Phi^T` of the base's residual less the tools' loads; none where these push nodes without columns.
+    pub(in crate::corrections) fn base_on_modes(
+        &mut self,
+        env: Env<'_>,
+        problem: &ContactProblem,
+    ) -> Option<&[f32]> {
+        let (p, mut is_known) = (&mut self.spare.on_modes, true);
+        p.copy_from_slice(&self.residuals.base_modes);
+        let held = &env.held.is;
+        problem.each_load(|node, force| match env.prior.column_for(held, node) {
+            Some((column, true)) => {
+                for (axis, force) in force.to_array().into_iter().enumerate() {
+                    add(-1e3 * force, env.space.at_contact(3 * column + axis), p);
+                }
+            }
+            _ => is_known &= held[node as usize],
+        });
+        is_known.then_some(p)
+    }
+
     /// `P` of the reduced residual, added to the direction ([`super::factor`]); outside of the core `w D^-1`. Leaves what it moves the modes by at the near nodes,
     /// by place, in `room.linear`.
     fn precondition(&mut self, step: &mut StepContext<'_>) -> Result<()> {

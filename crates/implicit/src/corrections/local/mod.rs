@@ -26,6 +26,7 @@ mod near;
 mod pairs;
 mod record;
 mod sets;
+mod settle;
 mod state;
 mod step;
 
@@ -41,7 +42,6 @@ use self::state::{Measured, Moved, Reach, Residuals, Spare};
 use self::step::{add, dot, resize};
 use super::far::FarField;
 use super::input::{Input, SolverContext};
-use super::passes::add_smoothed;
 use super::precondition::{Env, Preconditioner};
 use crate::contact::ContactProblem;
 use crate::error::Result;
@@ -346,41 +346,6 @@ impl LocalSolver {
         add(1.0, &self.now.stiff, p);
         add(t, &self.d.stiff, p);
         Ok(det.min(far_det).min(self.measured.far_det))
-    }
-
-    /// The whole field into `u`, which holds the base, of which `residual` is; `scratch [K,3]`. Leaves what the far nodes were smoothed by in `far_mm`,
-    /// and how far one has gone at most in `far_moved_mm`.
-    pub(super) fn settle(
-        &mut self,
-        step: &mut StepContext<'_>,
-        residual: &[f32],
-        scratch: &mut [f32],
-        u: &mut [f32],
-    ) -> Result<()> {
-        let env = step.context.env();
-        let preconditioner = &mut *step.preconditioner;
-        // `Phi c` at all nodes, once a round.
-        preconditioner.take_coordinates(env, &self.now.step.c)?;
-        preconditioner.decode(env, scratch)?;
-        for (place, t) in self.now.step.t.as_chunks::<3>().0.iter().enumerate() {
-            let node = self.set.near.nodes[place] as usize;
-            add(1.0, t, &mut scratch[3 * node..][..3]);
-        }
-        let (near, count) = (&self.set.near, u.len() / 3);
-        // Far nodes get the preconditioner's first level of the base's residual: a smoothing, for what the modes do not span.
-        let fields = (residual, &mut *scratch, u);
-        let moved = add_smoothed(
-            env,
-            fields,
-            |node| near.holds(node),
-            &mut self.spare.partial,
-        )?;
-        self.measured.far_mm = (moved / count.max(1) as f64).sqrt() as f32;
-        let changes = scratch.as_chunks::<3>().0.iter().zip(0..);
-        let far = changes.filter(|(_, node)| !near.holds(*node));
-        let squares = far.map(|(change, _)| change.iter().map(|x| x * x).sum::<f32>());
-        self.measured.far_moved_mm = squares.fold(0.0, f32::max).sqrt();
-        Ok(())
     }
 }
 

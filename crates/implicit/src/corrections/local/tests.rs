@@ -162,7 +162,7 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     local.now.step.add(1.0, &local.d.step);
     let (mut whole, mut scratch) = (u.clone(), bench.zero.clone());
     local
-        .settle(&mut step, &bench.zero, &mut scratch, &mut whole)
+        .settle(&mut step, &bench.zero, (&mut scratch, &mut whole), false)
         .unwrap();
     let at_base = local.residuals.base_modes.clone();
     let (near, r_found) = (local.set.near.nodes.clone(), local.residuals.next.r.clone());

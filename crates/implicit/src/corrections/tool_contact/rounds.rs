@@ -159,14 +159,16 @@ impl ToolStep<'_> {
 
     /// The state of the iterations into `at`, whose residual is not known then.
     pub(super) fn end_round(&mut self, at: &mut Iterate<'_>) -> Result<()> {
+        // What loads do far from the tools is not in the span of the iterations. What has been let go has moved before them, and is near.
+        let is_loaded = self.input.load.is_some() && self.context.held.let_go == 0;
+        let with_whole = is_loaded && self.ask_whole(at)? <= FAR_MM;
         let mut q = std::mem::take(&mut self.solver.fields.q);
         let (local, mut step, _) = self.local_solver()?;
         // Here the base, `t` and the modes become one field again.
-        let result = local.settle(&mut step, at.g, &mut q, at.u);
+        let result = local.settle(&mut step, at.g, (&mut q, at.u), with_whole);
         self.solver.fields.q = q;
         result?;
-        // What loads do far from the tools is not in the span of the iterations. What has been let go has moved before them, and is near.
-        match self.input.load.is_some() && self.context.held.let_go == 0 {
+        match is_loaded && !with_whole {
             true => self.move_whole(at, FAR_MM),
             false => Ok(()),
         }

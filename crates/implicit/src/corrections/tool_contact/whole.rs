@@ -7,6 +7,32 @@ use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 
 impl ToolStep<'_> {
+    /// Asks the whole modes what they make of the base's residual less the tools' loads, for the decoding at the end of a round; says how far that moves the
+    /// tissue, mm: without bounds where that is not known.
+    pub(super) fn ask_whole(&mut self, at: &Iterate<'_>) -> Result<f32> {
+        let (solver, env) = (&mut *self.solver, self.context.env());
+        let problem = &*self.problem;
+        let Some(local) = &mut solver.local else {
+            return Ok(f32::INFINITY);
+        };
+        let Some(on_modes) = local.base_on_modes(env, problem) else {
+            return Ok(f32::INFINITY);
+        };
+        let each_load = |take: &mut dyn FnMut(u32, [f32; 3])| {
+            problem.each_load(|node, force| take(node, force.to_array()));
+        };
+        let base = (at.g.as_slice(), on_modes);
+        let own = &mut solver.preconditioner;
+        let room = (
+            &own.basis.plan,
+            own.coordinates.as_mut_slice(),
+            solver.fields.q.as_mut_slice(),
+        );
+        let asked = own.whole.ask(env, base, each_load, room)?;
+        // A bundle without whole modes has nothing to move.
+        Ok(asked.unwrap_or(0.0))
+    }
+
     /// Moves the whole modes by what is out of balance on them. A move of more than `unchecked_mm` is taken back unless it leaves less of that: a tool that has
     /// lost the balance pushes with more than the body's softest modes bear.
     pub(super) fn move_whole(&mut self, at: &mut Iterate<'_>, unchecked_mm: f32) -> Result<()> {
