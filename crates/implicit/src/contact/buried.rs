@@ -14,6 +14,8 @@ use crate::memory::{self, HeldBytes};
 const LEAST_MM: f32 = 1.0;
 /// What lies deeper than this is looked for by the solid, mm.
 const PIERCED_MM: f32 = 4.0;
+/// A way out leans less than this (cosine) from a face that it goes along.
+const ALONG_FACE: f32 = 0.5;
 /// Ways out of the solid are looked for as far as this, mm.
 const LONGEST_MM: f32 = 30.0;
 /// A unit direction along no axis or diagonal.
@@ -168,8 +170,10 @@ fn below(point: Vector, nearest: u32, samples: &Samples, state: State<'_>) -> Op
         }
     }
     let (_, face, [_, v, w], out) = best?;
-    // Above the surface there is no way out to be found. The mean of the faces' normals holds on edges and nodes too.
-    if out.dot(outward) <= 0.0 || out.dot(face_outward) <= 0.0 {
+    // Above the surface there is no way out to be found. The mean of the faces' normals holds on edges and nodes too. A way along the
+    // face ends at a rim of the touchable surface, beside which the point lies: at the lips of a cut, whose walls no sample is on.
+    let along_face = ALONG_FACE * out.length() * face_outward.length();
+    if out.dot(outward) <= 0.0 || out.dot(face_outward) <= along_face {
         return None;
     }
     let i = (v * LATTICE as f32).round() as u32;
@@ -268,4 +272,39 @@ fn nearest_weights(p: Vector, [a, b, c]: [Vector; 3]) -> [f32; 3] {
     }
     let whole = va + vb + vc;
     [va / whole, vb / whole, vc / whole]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::contact::{SPACING_MM, Shape};
+
+    /// A plate of 20 by 20 mm that samples cover, and nothing beside it.
+    #[test]
+    fn a_tip_beside_the_rim_of_the_samples_is_not_in_the_tissue() {
+        let at = |x: u32, y: u32| [10.0 * x as f32, 10.0 * y as f32, 0.0];
+        let places: Vec<[f32; 3]> = (0..9).map(|i| at(i % 3, i / 3)).collect();
+        let faces = [0, 1, 3, 4].into_iter();
+        let faces: Vec<[u32; 3]> = faces
+            .flat_map(|i| [[i, i + 1, i + 3], [i + 1, i + 4, i + 3]])
+            .collect();
+        let samples = Samples::new(&places, faces, &[], SPACING_MM);
+        let ball = Shape::Sphere { radius: 1.0 };
+        let body = Body::new(&ball).unwrap();
+        let tip = |at: [f32; 3]| {
+            let state = State {
+                rest: places.as_flattened(),
+                u: &[],
+                start: &[],
+            };
+            let pose = Pose::from_translation(at.into());
+            Buried::tip(&body, &pose, &samples, state).map(|tip| (tip.depth, tip.out))
+        };
+        let (depth, out) = tip([12.0, 9.0, -1.5]).unwrap();
+        assert!((depth - 1.5).abs() < 1e-5 && out.distance(Vector::Z) < 1e-5);
+        assert_eq!(tip([12.0, 9.0, 1.5]), None);
+        // Below the plane of the plate, but beside it; and below its rim.
+        assert_eq!(tip([21.5, 9.0, -0.3]), None);
+        assert!(tip([20.2, 9.0, -1.5]).is_some());
+    }
 }
