@@ -829,7 +829,8 @@ public:
 
   /// What acts beside the instruments (gravity, pressures, ties, what holds the organ): `fill` is
   /// called with the input of each step that this clock makes, and its moment, s. What the input
-  /// points to must stay until the call that made the step returns.
+  /// points to must stay until the call that made the step returns. No step is in flight then, so
+  /// `fill` may change the body (`cut`, `remove`, `restore`) before the step.
   void load(std::function<void(Input &, double)> fill) { load_ = std::move(fill); }
 
   /// One frame: takes a finished step, writes the tissue at `now` with the instruments where they
@@ -840,27 +841,20 @@ public:
   /// A failed step is returned (or thrown) once; the next frame goes on.
   upt_status frame(Scene &scene, double now, span<const upt_instrument> instruments,
                    span<float> out) {
-    moved(now, instruments);
-    landed_now_ = false;
-    upt_status result = collect(scene);
-    look(scene);
-    if (result == UPT_OK) {
-      result = catch_up(scene, now);
-    }
-    upt_status status = show(scene, now, instruments, out);
-    if (status == UPT_OK && in_flight_ && look(scene)) {
-      // A step that finished after it was asked for has changed the state under the frame.
-      status = show(scene, now, instruments, out);
-    }
-    if (status == UPT_OK && due(now)) {
-      look(scene);
-      const std::vector<upt_instrument> &poses = start(now);
-      status = upt_scene_submit(scene.get(), loaded(poses).get());
-      if (status < 0) {
-        in_flight_ = false;
-      }
-    }
-    return check(status < 0 ? status : result);
+    return frame_of(scene, now, instruments, [&] { return show(scene, now, instruments, out); });
+  }
+
+  /// The same for a body that `load` changes: writes its surface. `surface` is the last one that
+  /// `scene.surface` filled, also from within `load`; out gets three floats for each of its
+  /// vertices, mm, from where it lies at rest.
+  upt_status frame(Scene &scene, double now, span<const upt_instrument> instruments,
+                   const Surface &surface, std::vector<float> &out) {
+    return frame_of(scene, now, instruments, [&] {
+      const upt_view shown = view(UPT_VIEW_SURFACE);
+      out.resize(surface.rest.size());
+      return upt_scene_present(scene.get(), Input(instruments).get(), since(now), &shown,
+                               out.data(), out.size());
+    });
   }
 
   /// Whether the last frame took a finished step: readings and statistics are new.
@@ -935,6 +929,44 @@ private:
     std::vector<upt_instrument> poses;
   };
 
+  template <typename Show>
+  upt_status frame_of(Scene &scene, double now, span<const upt_instrument> instruments, Show show) {
+    moved(now, instruments);
+    landed_now_ = false;
+    upt_status result = collect(scene);
+    look(scene);
+    if (result == UPT_OK) {
+      result = catch_up(scene, now);
+    }
+    upt_status status;
+    if (due(now)) {
+      Started step(*this);
+      const Input input = loaded(start(now));
+      status = show();
+      if (status == UPT_OK) {
+        status = upt_scene_submit(scene.get(), input.get());
+        step.made = status >= 0;
+      }
+    } else {
+      status = show();
+      if (status == UPT_OK && in_flight_ && look(scene)) {
+        // A step that finished after it was asked for has changed the state under the frame.
+        status = show();
+      }
+    }
+    return check(status < 0 ? status : result);
+  }
+
+  // A step that is not made after all, because `load` threw or a call failed, is not in flight.
+  struct Started {
+    explicit Started(FrameClock &clock) : clock(clock) {}
+    Started(const Started &) = delete;
+    Started &operator=(const Started &) = delete;
+    ~Started() { clock.in_flight_ = clock.in_flight_ && made; }
+    FrameClock &clock;
+    bool made = false;
+  };
+
   upt_status collect(Scene &scene) {
     if (!in_flight_) {
       return UPT_OK;
@@ -954,8 +986,10 @@ private:
       if (upt_scene_read_timing(scene.get(), &last) != UPT_OK || last.step_ms > 500 * dt_) {
         break;
       }
-      const std::vector<upt_instrument> &poses = start(now);
-      const upt_status status = upt_scene_step(scene.get(), loaded(poses).get(), nullptr, 0);
+      Started step(*this);
+      const Input input = loaded(start(now));
+      const upt_status status = upt_scene_step(scene.get(), input.get(), nullptr, 0);
+      step.made = true;
       finished();
       look(scene);
       if (status < 0) {
