@@ -1,12 +1,13 @@
-// A simulator with a window: a brain that a spatula presses, stepped by libupt beside the frame.
+// A simulator with a window: an organ that a spatula presses, a blade cuts, an aspirator takes from
+// and a coagulator hardens, stepped by libupt beside the frame.
 //
 //   simulator BUNDLE [--size WxH] [--scale MM] [--breathe]
-//   simulator BUNDLE --headless --frames N [--screenshot OUT.png]
+//   simulator BUNDLE --headless --frames N [--operate] [--screenshot OUT.png]
 //
 // With --breathe what holds the organ goes up and down, and the organ lags behind.
-// Headless, a script plays the mouse: the spatula comes to a flat place of the domain and presses;
-// time passes at 60 frames a second whatever the machine does, so that the picture depends on N
-// alone.
+// Headless, a script plays the mouse: the spatula comes to a flat place of the domain and presses,
+// with --operate after the other tools have worked; time passes at 60 frames a second whatever the
+// machine does, so that the picture depends on N alone.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -16,11 +17,12 @@
 #include <stdexcept>
 
 #include "picture.hpp"
+#include "script.hpp"
 #include "view.hpp"
 
 struct Options {
   std::string bundle, screenshot;
-  bool headless = false, breathe = false;
+  bool headless = false, breathe = false, operate = false;
   long frames = -1;
   int width = 1280, height = 800;
   float scale_mm = 10;
@@ -40,6 +42,8 @@ static Options parse(int argc, char **argv) {
       options.headless = true;
     } else if (word == "--breathe") {
       options.breathe = true;
+    } else if (word == "--operate") {
+      options.operate = true;
     } else if (word == "--frames") {
       options.frames = std::strtol(value(), nullptr, 10);
     } else if (word == "--screenshot") {
@@ -58,10 +62,13 @@ static Options parse(int argc, char **argv) {
   }
   if (options.bundle.empty()) {
     throw std::runtime_error("usage: simulator BUNDLE [--size WxH] [--scale MM] [--breathe] "
-                             "[--headless --frames N] [--screenshot OUT.png]");
+                             "[--headless --frames N] [--operate] [--screenshot OUT.png]");
   }
   if (options.headless && options.frames < 1) {
     throw std::runtime_error("--headless needs --frames N");
+  }
+  if (options.operate && !options.headless) {
+    throw std::runtime_error("--operate plays the mouse of a --headless run");
   }
   return options;
 }
@@ -98,7 +105,26 @@ struct Window {
     glfwTerminate();
   }
   bool button(int which) const { return glfwGetMouseButton(handle, which) == GLFW_PRESS; }
+  bool key(int which) const { return glfwGetKey(handle, which) == GLFW_PRESS; }
 };
+
+// Keys choose the tool, take back a stroke (once a press of the key) and return to rest.
+static void read_keys(const Window &window, Tissue &tissue, Kind &kind) {
+  static bool took_back = false;
+  const Kind kinds[] = {Kind::press, Kind::blade, Kind::aspirate, Kind::coagulate};
+  for (int i = 0; i < 4; i++) {
+    if (window.key(GLFW_KEY_1 + i) && (i == 0 || tissue.can_be_cut())) {
+      kind = kinds[i];
+    }
+  }
+  if (window.key(GLFW_KEY_U) && !took_back) {
+    tissue.undo();
+  }
+  took_back = window.key(GLFW_KEY_U);
+  if (window.key(GLFW_KEY_R)) {
+    tissue.reset();
+  }
+}
 
 // The mouse's ray; right drag and wheel move the camera.
 static Ray read_mouse(Window &window, Camera &camera) {
@@ -126,13 +152,20 @@ static void run(const Options &options) {
   View view;
   view.create(tissue, options.scale_mm);
   Spatula spatula(std::min(10.0F, tissue.info().max_push_mm));
+  Cutter cutter;
 
   const Hit site = tissue.flat_site();
   Camera camera;
-  // From the side of the site, along the surface a little, so that the dent is seen in profile.
+  // From the side of the site, along the surface a little, so that the dent is seen in profile; a
+  // wound is looked into.
   const Frame around = frame_around(site.normal, {0, 0, 1});
-  camera.frame(tissue.centre() * 0.4F + site.point * 0.6F, 0.45F * tissue.radius(),
-               around.z + around.x * 0.75F + around.y * 0.35F);
+  if (options.operate) {
+    camera.frame(site.point, 0.28F * tissue.radius(),
+                 around.z + around.x * 0.45F + around.y * 0.25F);
+  } else {
+    camera.frame(tissue.centre() * 0.4F + site.point * 0.6F, 0.45F * tissue.radius(),
+                 around.z + around.x * 0.75F + around.y * 0.35F);
+  }
 
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
@@ -146,24 +179,27 @@ static void run(const Options &options) {
     camera.set_size(width, height);
 
     double now;
-    bool pressed;
+    Mouse mouse{};
     if (options.headless) {
       now = static_cast<double>(frame) / 60;
-      pressed = frame >= 15;
-      spatula.hover(site, Ray{site.point + site.normal * 100, -site.normal});
+      mouse = scripted(site, options.operate, frame);
     } else {
       now = std::chrono::duration<double>(frame_start - start).count();
-      const Ray ray = read_mouse(window, camera);
-      pressed = window.button(GLFW_MOUSE_BUTTON_LEFT);
-      spatula.hover(tissue.pick(ray), ray);
-      if (glfwGetKey(window.handle, GLFW_KEY_R) == GLFW_PRESS) {
-        tissue.reset();
-      }
+      mouse = {read_mouse(window, camera), window.button(GLFW_MOUSE_BUTTON_LEFT), cutter.kind()};
+      read_keys(window, tissue, mouse.kind);
     }
-    spatula.move(static_cast<float>(std::min(now - last, 0.1)), pressed);
+    const std::optional<Hit> under = tissue.pick(mouse.ray);
+    const bool presses = mouse.kind == Kind::press;
+    cutter.take(mouse.kind);
+    cutter.hover(under);
+    cutter.press(mouse.pressed);
+    spatula.hover(presses ? under : std::nullopt, mouse.ray);
+    spatula.move(static_cast<float>(std::min(now - last, 0.1)), presses && mouse.pressed);
     last = now;
 
     if (tissue.solves_contact()) {
+      const std::optional<upt_instrument> tool = cutter.at_work();
+      tissue.work(mouse.kind, tool ? &*tool : nullptr);
       tissue.frame(now, spatula.instruments());
     } else {
       tissue.advance(now, spatula.contacts(tissue));
@@ -172,7 +208,7 @@ static void run(const Options &options) {
     if (options.headless) {
       tissue.finish();
     }
-    view.draw(tissue, spatula, camera, width, height, frame_ms);
+    view.draw(tissue, spatula, cutter, camera, width, height, frame_ms);
     frame++;
     if (frame == options.frames && !options.screenshot.empty()) {
       save_picture(options.screenshot, width, height);
@@ -193,6 +229,13 @@ static void run(const Options &options) {
               tissue.solves_contact()      ? "the library's solve"
               : spatula.library_contacts() ? "the library's nodes"
                                            : "the simulator");
+  const Surgery &surgery = tissue.surgery();
+  if (surgery.has_begun()) {
+    std::printf("cut %.0f mm2, taken %.0f mm3, hardened %zu elements; the surface has changed %lld "
+                "times\n",
+                static_cast<double>(surgery.area()), static_cast<double>(surgery.removed()),
+                surgery.hardened(), static_cast<long long>(surgery.changes()));
+  }
   if (tissue.reading()) {
     const upt_instrument_reading &felt = *tissue.reading();
     std::printf("the spatula feels %.0f mN at %u points, penetration %.2f mm; flags: %s\n",

@@ -52,26 +52,6 @@ Contacts Spatula::contacts(Tissue &tissue) {
   return out;
 }
 
-// A frame's rotation as a unit quaternion x, y, z, w.
-static std::array<float, 4> quaternion(const Frame &f) {
-  const float trace = f.x.x + f.y.y + f.z.z;
-  std::array<float, 4> q;
-  if (trace > 0) {
-    const float s = 2 * std::sqrt(1 + trace);
-    q = {(f.y.z - f.z.y) / s, (f.z.x - f.x.z) / s, (f.x.y - f.y.x) / s, s / 4};
-  } else if (f.x.x > f.y.y && f.x.x > f.z.z) {
-    const float s = 2 * std::sqrt(1 + f.x.x - f.y.y - f.z.z);
-    q = {s / 4, (f.y.x + f.x.y) / s, (f.z.x + f.x.z) / s, (f.y.z - f.z.y) / s};
-  } else if (f.y.y > f.z.z) {
-    const float s = 2 * std::sqrt(1 + f.y.y - f.x.x - f.z.z);
-    q = {(f.y.x + f.x.y) / s, s / 4, (f.z.y + f.y.z) / s, (f.z.x - f.x.z) / s};
-  } else {
-    const float s = 2 * std::sqrt(1 + f.z.z - f.x.x - f.y.y);
-    q = {(f.z.x + f.x.z) / s, (f.z.y + f.y.z) / s, s / 4, (f.x.y - f.y.x) / s};
-  }
-  return q;
-}
-
 upt_instrument Spatula::blade() const {
   upt_instrument blade = upt::make<upt_instrument>();
   const Vec3 position = centre();
@@ -114,7 +94,7 @@ bool Spatula::library(Tissue &tissue, Contacts &out) {
 
 void Spatula::own(const Tissue &tissue, Contacts &out) const {
   for (const std::uint32_t node : tissue.domain()) {
-    const Vec3 from_anchor = tissue.rest()[node] - anchor_.rest;
+    const Vec3 from_anchor = tissue.nodes()[node] - anchor_.rest;
     const float across = dot(from_anchor, frame_.x), along = dot(from_anchor, frame_.y),
                 height = dot(from_anchor, frame_.z);
     const float below = height + depth_; // how far the blade has gone past the node

@@ -1,5 +1,6 @@
 // The deforming tissue: libupt steps on the scene's own worker, each frame shows the tissue at its
-// own moment. Where a bundle does not solve contact a frame lies between the last two steps.
+// own moment. Where a bundle does not solve contact a frame lies between the last two steps. Tools
+// may change the body: then its surface is another one.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "camera.hpp"
+#include "surgery.hpp"
 #include "upt.hpp"
 #include "vec.hpp"
 
@@ -34,8 +36,15 @@ public:
   // A frame with rigid instruments whose contact the library solves: the surface at `now`, and the
   // next step when it is due.
   void frame(double now, upt::span<const upt_instrument> instruments);
+  // From the next step on a tool changes the body as `kind` says; null: it is lifted.
+  void work(Kind kind, const upt_instrument *tool);
+  // The body before the last stroke; false where there is none.
+  bool undo();
+  const Surgery &surgery() const { return surgery_; }
   // Whether the bundle and this build solve contact: then instruments drive the steps.
   bool solves_contact() const { return solves_contact_; }
+  // Whether tools may change the body: not while what holds it moves.
+  bool can_be_cut() const { return solves_contact_ && !breathes_; }
   // What the tissue did to the first instrument of the last finished step; none: it had none.
   const std::optional<upt_instrument_reading> &reading() const { return reading_; }
   // Waits for the step in flight (for pictures that must not depend on the machine's speed).
@@ -65,16 +74,24 @@ public:
   // The surface at rest; per vertex: position 3, normal 3, present displacement 1.
   static constexpr std::size_t GHOST_FLOATS = 7;
   const std::vector<float> &ghost() const { return ghost_; }
-  // Three a triangle, indices of surface vertices.
+  // Three a triangle, indices of surface vertices; the first `outside` of them were on the surface
+  // of the intact body, the others inside.
   const std::vector<std::uint32_t> &triangles() const { return triangles_; }
-  const std::vector<Vec3> &rest() const { return rest_; }
+  std::size_t outside() const { return outside_; }
+  // All nodes of the mesh, and those that instruments may touch.
+  const std::vector<Vec3> &nodes() const { return nodes_; }
   const std::vector<std::uint32_t> &domain() const { return domain_; }
   float max_displacement() const { return max_displacement_; }
   double median_step_ms() const;
 
 private:
   Vec3 position(std::uint32_t vertex) const;
+  void load(upt::Input &input, double moment);
+  void take_surface();
+  void find_rest();
   void find_cavities();
+  void find_bounds();
+  void sum_normals();
   void count_step(std::size_t instruments);
   void fill(const std::vector<float> &displacement);
 
@@ -82,11 +99,14 @@ private:
   upt::Scene scene_;
   upt_model_info info_;
   upt::FrameClock clock_;
-  std::vector<Vec3> rest_;             // all nodes
-  std::vector<std::uint32_t> surface_; // node of each surface vertex
+  Surgery surgery_;
+  std::vector<Vec3> rest_;             // of surface vertices
+  std::vector<Vec3> nodes_;            // of the mesh, at rest
   std::vector<std::uint32_t> domain_;  // nodes that instruments may touch
   std::vector<bool> vertex_in_domain_; // per surface vertex
   std::vector<std::uint32_t> triangles_;
+  std::size_t outside_ = 0;
+  std::vector<bool> vertex_outside_; // per surface vertex: of a triangle that was outside
   std::vector<Vec3> rest_normals_;
   std::vector<float> displacement_, vertices_, ghost_, cavity_;
   std::vector<double> step_ms_;
@@ -95,6 +115,9 @@ private:
   bool in_flight_ = false, solves_contact_ = true;
   std::optional<upt_instrument_reading> reading_;
   std::uint64_t counted_steps_ = 0;
+  Kind kind_ = Kind::press;
+  std::optional<upt_instrument> tool_; // that changes the body
+  std::int64_t taken_ = 0;             // of the body's surfaces, the one that is shown
   bool breathes_ = false;
   float height_ = 0;
   double last_start_ = -1e9;

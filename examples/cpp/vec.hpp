@@ -38,6 +38,26 @@ inline Frame frame_around(Vec3 z, Vec3 up) {
   return {x, cross(main, x), main};
 }
 
+// A frame's rotation as a unit quaternion x, y, z, w.
+inline std::array<float, 4> quaternion(const Frame &f) {
+  const float trace = f.x.x + f.y.y + f.z.z;
+  std::array<float, 4> q;
+  if (trace > 0) {
+    const float s = 2 * std::sqrt(1 + trace);
+    q = {(f.y.z - f.z.y) / s, (f.z.x - f.x.z) / s, (f.x.y - f.y.x) / s, s / 4};
+  } else if (f.x.x > f.y.y && f.x.x > f.z.z) {
+    const float s = 2 * std::sqrt(1 + f.x.x - f.y.y - f.z.z);
+    q = {s / 4, (f.y.x + f.x.y) / s, (f.z.x + f.x.z) / s, (f.y.z - f.z.y) / s};
+  } else if (f.y.y > f.z.z) {
+    const float s = 2 * std::sqrt(1 + f.y.y - f.x.x - f.z.z);
+    q = {(f.y.x + f.x.y) / s, s / 4, (f.z.y + f.y.z) / s, (f.z.x - f.x.z) / s};
+  } else {
+    const float s = 2 * std::sqrt(1 + f.z.z - f.x.x - f.y.y);
+    q = {(f.z.x + f.x.z) / s, (f.z.y + f.y.z) / s, s / 4, (f.x.y - f.y.x) / s};
+  }
+  return q;
+}
+
 using Mat4 = std::array<float, 16>;
 
 inline Mat4 operator*(const Mat4 &a, const Mat4 &b) {

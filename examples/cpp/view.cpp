@@ -41,14 +41,17 @@ static const char *TISSUE_FRAGMENT = "#version 330 core\n" RAMP R"(
 in vec3 world, side;
 in float moved, depth;
 uniform vec3 eye;
-uniform float scale;
+uniform float scale, inside;
 out vec4 result;
 void main() {
-  vec3 n = normalize(side), v = normalize(eye - world);
+  vec3 v = normalize(eye - world);
+  // What a cut has laid open is lit face by face.
+  vec3 n = inside > 0.5 ? normalize(cross(dFdx(world), dFdy(world))) : normalize(side);
   vec3 up = vec3(0.0, 0.0, 1.0);
   vec3 key = normalize(v + 0.9 * up + 0.5 * cross(up, v));
   vec3 fill = normalize(v - 1.2 * cross(up, v));
   vec3 tone = ramp(moved / scale) * mix(1.0, 0.52, smoothstep(-0.05, 0.30, depth));
+  tone = mix(tone, vec3(0.50, 0.10, 0.10), inside);
   float diffuse = 0.70 * max(dot(n, key), 0.0) + 0.16 * max(dot(n, fill), 0.0) + 0.22;
   float shine = pow(max(dot(n, normalize(key + v)), 0.0), 48.0);
   float rim = pow(1.0 - max(dot(n, v), 0.0), 3.0);
@@ -141,6 +144,12 @@ static void add_box(std::vector<float> &out, Vec3 centre, Vec3 half, const Frame
   }
 }
 
+static GLsizei upload_metal(gl::Vertices &vertices, const std::vector<float> &metal) {
+  vertices.create({3, 3});
+  vertices.upload(metal.data(), metal.size() * sizeof metal[0]);
+  return static_cast<GLsizei>(metal.size() / 6);
+}
+
 void View::create(const Tissue &tissue, float scale_mm) {
   scale_mm_ = scale_mm;
   tissue_program_ = gl::program(TISSUE_VERTEX, TISSUE_FRAGMENT);
@@ -150,13 +159,12 @@ void View::create(const Tissue &tissue, float scale_mm) {
   tissue_.create({3, 3, 1, 1});
   const auto &triangles = tissue.triangles();
   tissue_.upload_elements(triangles.data(), triangles.size() * sizeof triangles[0]);
-  index_count_ = static_cast<GLsizei>(triangles.size());
 
   ghost_program_ = gl::program(GHOST_VERTEX, GHOST_FRAGMENT);
   ghost_.create({3, 3, 1});
   ghost_.upload_elements(triangles.data(), triangles.size() * sizeof triangles[0]);
 
-  // The blade, and a handle that rises from its end.
+  // The spatula's blade, and a handle that rises from its end.
   std::vector<float> metal;
   const Frame straight = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   add_box(metal, {}, Spatula::HALF, straight);
@@ -165,9 +173,14 @@ void View::create(const Tissue &tissue, float scale_mm) {
   const Vec3 root = {0, Spatula::HALF.y - 0.5F, 0};
   add_box(metal, root + rise * 12, {2.4F, 13, 0.7F}, tilted);
   add_box(metal, root + rise * 52, {3.0F, 28, 2.2F}, tilted);
-  metal_.create({3, 3});
-  metal_.upload(metal.data(), metal.size() * sizeof metal[0]);
-  metal_count_ = static_cast<GLsizei>(metal.size() / 6);
+  metal_count_ = upload_metal(metal_, metal);
+  // Cutters, from the tip up their axis: a blade and its handle, a tube.
+  std::vector<float> blade, tube;
+  add_box(blade, {0, 12, 0}, {2.2F, 12, 0.25F}, straight);
+  add_box(blade, {0, 54, 0}, {3.0F, 30, 1.6F}, straight);
+  blade_count_ = upload_metal(blade_, blade);
+  add_box(tube, {0, 40, 0}, {Cutter::RADIUS * 0.7F, 40, Cutter::RADIUS * 0.7F}, straight);
+  tube_count_ = upload_metal(tube_, tube);
 
   const float corners[6] = {-1, -1, 3, -1, -1, 3};
   background_.create({2});
@@ -187,32 +200,56 @@ static GLint uniform(GLuint program, const char *name) {
   return gl::GetUniformLocation(program, name);
 }
 
-void View::draw(const Tissue &tissue, const Spatula &spatula, const Camera &camera, int width,
-                int height, double frame_ms) {
+void View::draw(const Tissue &tissue, const Spatula &spatula, const Cutter &cutter,
+                const Camera &camera, int width, int height, double frame_ms) {
   const Mat4 matrix = camera.matrix();
   const Vec3 eye = camera.eye();
   gl::Viewport(0, 0, width, height);
   draw_background();
 
   gl::Enable(GL_DEPTH_TEST);
+  draw_tissue(tissue, matrix, eye);
+  if (cutter.kind() == Kind::press && spatula.visible()) {
+    draw_metal(metal_, metal_count_, placed(spatula.frame(), spatula.centre()), matrix, eye);
+  } else if (cutter.visible()) {
+    const bool is_blade = cutter.kind() == Kind::blade;
+    draw_metal(is_blade ? blade_ : tube_, is_blade ? blade_count_ : tube_count_,
+               placed(cutter.frame(), cutter.tip()), matrix, eye);
+  }
+  if (!tissue.surgery().has_begun()) {
+    draw_ghost(tissue, matrix, eye);
+  }
+  draw_numbers(tissue, spatula, cutter, width, height, frame_ms);
+}
+
+void View::draw_tissue(const Tissue &tissue, const Mat4 &matrix, Vec3 eye) {
+  const auto &triangles = tissue.triangles();
+  if (uploaded_ != tissue.surgery().changes()) {
+    uploaded_ = tissue.surgery().changes();
+    tissue_.upload_elements(triangles.data(), triangles.size() * sizeof triangles[0]);
+  }
   gl::UseProgram(tissue_program_);
   gl::UniformMatrix4fv(uniform(tissue_program_, "camera"), 1, GL_FALSE, matrix.data());
   gl::Uniform3f(uniform(tissue_program_, "eye"), eye.x, eye.y, eye.z);
   gl::Uniform1f(uniform(tissue_program_, "scale"), scale_mm_);
   tissue_.upload(tissue.vertices().data(), tissue.vertices().size() * sizeof(float));
-  gl::DrawElements(GL_TRIANGLES, index_count_, GL_UNSIGNED_INT, nullptr);
-
-  if (spatula.visible()) {
-    const Mat4 place = placed(spatula.frame(), spatula.centre());
-    gl::UseProgram(metal_program_);
-    gl::UniformMatrix4fv(uniform(metal_program_, "camera"), 1, GL_FALSE, matrix.data());
-    gl::UniformMatrix4fv(uniform(metal_program_, "place"), 1, GL_FALSE, place.data());
-    gl::Uniform3f(uniform(metal_program_, "eye"), eye.x, eye.y, eye.z);
-    gl::BindVertexArray(metal_.array);
-    gl::DrawArrays(GL_TRIANGLES, 0, metal_count_);
+  const std::size_t ranges[3] = {0, tissue.outside(), triangles.size()};
+  for (int inside = 0; inside < 2; inside++) {
+    gl::Uniform1f(uniform(tissue_program_, "inside"), static_cast<float>(inside));
+    const auto count = static_cast<GLsizei>(ranges[inside + 1] - ranges[inside]);
+    gl::DrawElements(GL_TRIANGLES, count, GL_UNSIGNED_INT,
+                     reinterpret_cast<const void *>(ranges[inside] * sizeof triangles[0]));
   }
-  draw_ghost(tissue, matrix, eye);
-  draw_numbers(tissue, spatula, width, height, frame_ms);
+}
+
+void View::draw_metal(const gl::Vertices &metal, GLsizei count, const Mat4 &place,
+                      const Mat4 &matrix, Vec3 eye) {
+  gl::UseProgram(metal_program_);
+  gl::UniformMatrix4fv(uniform(metal_program_, "camera"), 1, GL_FALSE, matrix.data());
+  gl::UniformMatrix4fv(uniform(metal_program_, "place"), 1, GL_FALSE, place.data());
+  gl::Uniform3f(uniform(metal_program_, "eye"), eye.x, eye.y, eye.z);
+  gl::BindVertexArray(metal.array);
+  gl::DrawArrays(GL_TRIANGLES, 0, count);
 }
 
 void View::draw_ghost(const Tissue &tissue, const Mat4 &matrix, Vec3 eye) {
@@ -223,7 +260,8 @@ void View::draw_ghost(const Tissue &tissue, const Mat4 &matrix, Vec3 eye) {
   gl::UniformMatrix4fv(uniform(ghost_program_, "camera"), 1, GL_FALSE, matrix.data());
   gl::Uniform3f(uniform(ghost_program_, "eye"), eye.x, eye.y, eye.z);
   ghost_.upload(tissue.ghost().data(), tissue.ghost().size() * sizeof(float));
-  gl::DrawElements(GL_TRIANGLES, index_count_, GL_UNSIGNED_INT, nullptr);
+  gl::DrawElements(GL_TRIANGLES, static_cast<GLsizei>(tissue.triangles().size()), GL_UNSIGNED_INT,
+                   nullptr);
   gl::DepthMask(GL_TRUE);
   gl::Disable(GL_BLEND);
 }
@@ -257,8 +295,32 @@ std::string flag_names(std::uint32_t flags) {
   return out.empty() ? "none" : out;
 }
 
-void View::draw_numbers(const Tissue &tissue, const Spatula &spatula, int width, int height,
-                        double frame_ms) {
+// What the chosen tool has done to the body.
+void View::draw_work(const Tissue &tissue, const Cutter &cutter, int height) {
+  static const char *const names[] = {"SPATULA", "BLADE", "ASPIRATOR", "COAGULATOR"};
+  const Surgery &surgery = tissue.surgery();
+  const auto &force = surgery.force();
+  std::string line = names[static_cast<int>(cutter.kind())];
+  if (surgery.has_begun()) {
+    char work[120];
+    std::snprintf(work, sizeof work, "   CUT %.0f MM2   TAKEN %.0f MM3   HARDENED %zu",
+                  static_cast<double>(surgery.area()), static_cast<double>(surgery.removed()),
+                  surgery.hardened());
+    line += work;
+    if (cutter.kind() == Kind::blade) {
+      std::snprintf(work, sizeof work, "   BLADE %.0f MN",
+                    static_cast<double>(length({force[0], force[1], force[2]})));
+      line += work;
+    }
+  }
+  overlay_.text(16, static_cast<float>(height) - 72, 2, line, {0.92F, 0.94F, 0.96F});
+  overlay_.text(16, static_cast<float>(height) - 50, 2,
+                "1: SPATULA   2: BLADE   3: ASPIRATOR   4: COAGULATOR   U: UNDO",
+                {0.62F, 0.68F, 0.74F});
+}
+
+void View::draw_numbers(const Tissue &tissue, const Spatula &spatula, const Cutter &cutter,
+                        int width, int height, double frame_ms) {
   const Vec3 bright = {0.92F, 0.94F, 0.96F}, dim = {0.62F, 0.68F, 0.74F};
   const upt_scene_stats stats = tissue.stats();
   char line[160];
@@ -286,9 +348,10 @@ void View::draw_numbers(const Tissue &tissue, const Spatula &spatula, int width,
     overlay_.text(16, 82, 2, names, {0.95F, 0.72F, 0.29F});
   }
   overlay_.text(16, static_cast<float>(height) - 28, 2,
-                "LEFT: PRESS   RIGHT: TURN   WHEEL: ZOOM   R: RESET", dim);
+                "LEFT: WORK   RIGHT: TURN   WHEEL: ZOOM   R: RESET", dim);
+  draw_work(tissue, cutter, height);
 
-  const float left = static_cast<float>(width) - 250, top = static_cast<float>(height) - 46;
+  const float left = static_cast<float>(width) - 250, top = 16;
   for (int i = 0; i < 100; i++) {
     const float s = 0.04F * static_cast<float>(i);
     const int stop = std::min(static_cast<int>(s), 3);

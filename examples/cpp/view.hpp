@@ -2,6 +2,7 @@
 #pragma once
 
 #include "camera.hpp"
+#include "cutter.hpp"
 #include "overlay.hpp"
 #include "spatula.hpp"
 #include "tissue.hpp"
@@ -13,19 +14,24 @@ class View {
 public:
   // Colours span 0 to `scale_mm` of displacement.
   void create(const Tissue &tissue, float scale_mm);
-  void draw(const Tissue &tissue, const Spatula &spatula, const Camera &camera, int width,
-            int height, double frame_ms);
+  void draw(const Tissue &tissue, const Spatula &spatula, const Cutter &cutter,
+            const Camera &camera, int width, int height, double frame_ms);
 
 private:
   void draw_background();
-  void draw_numbers(const Tissue &tissue, const Spatula &spatula, int width, int height,
-                    double frame_ms);
+  void draw_tissue(const Tissue &tissue, const Mat4 &matrix, Vec3 eye);
+  void draw_metal(const gl::Vertices &metal, GLsizei count, const Mat4 &place, const Mat4 &matrix,
+                  Vec3 eye);
+  void draw_numbers(const Tissue &tissue, const Spatula &spatula, const Cutter &cutter, int width,
+                    int height, double frame_ms);
+  void draw_work(const Tissue &tissue, const Cutter &cutter, int height);
 
   void draw_ghost(const Tissue &tissue, const Mat4 &matrix, Vec3 eye);
 
   GLuint tissue_program_ = 0, ghost_program_ = 0, metal_program_ = 0, background_program_ = 0;
-  gl::Vertices tissue_, ghost_, metal_, background_;
-  GLsizei index_count_ = 0, metal_count_ = 0;
+  gl::Vertices tissue_, ghost_, metal_, blade_, tube_, background_;
+  GLsizei metal_count_ = 0, blade_count_ = 0, tube_count_ = 0;
+  std::int64_t uploaded_ = 0; // of the body's surfaces, the one whose triangles are drawn
   Overlay overlay_;
   float scale_mm_ = 10;
 };

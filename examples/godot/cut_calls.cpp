@@ -3,13 +3,14 @@
 
 #include <stdexcept>
 
-/* work_as(kind): what the tool does from the next press on: 0 presses, 1 cuts, 2 aspirates. */
+/* work_as(kind): what the tool does from the next press on: 0 presses, 1 cuts, 2 aspirates,
+ * 3 coagulates. */
 void work_as(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result) {
   put(result, opened(instance, [&](Tissue &tissue) {
         const int64_t kind = *static_cast<const int64_t *>(arguments[0]);
-        if (kind < 0 || kind > static_cast<int64_t>(Kind::aspirate)) {
+        if (kind < 0 || kind > static_cast<int64_t>(Kind::coagulate)) {
           throw std::runtime_error("work_as: the kind is " + std::to_string(kind) +
-                                   "; 0 presses, 1 cuts, 2 aspirates");
+                                   "; 0 presses, 1 cuts, 2 aspirates, 3 coagulates");
         }
         tissue.kind = static_cast<Kind>(kind);
       }));

@@ -45,7 +45,8 @@ cp "$here"/project.godot "$here"/upt.gdextension "$here"/main.tscn "$here"/pushe
 (cd "$build" && "$godot" --headless --dump-gdextension-interface >/dev/null 2>&1)
 flags=(-O2 -Wall -Wextra -Werror -fPIC -fvisibility=hidden -I"$build" -I"$include")
 cc -std=c11 "${flags[@]}" -c "$here/godot_api.c" -o "$build/godot_api.o"
-c++ -std=c++17 "${flags[@]}" -shared "$here"/*.cpp "$build/godot_api.o" \
+c++ -std=c++17 "${flags[@]}" -I"$root/examples/cpp" -shared "$here"/*.cpp \
+  "$root/examples/cpp/surgery.cpp" "$build/godot_api.o" \
   -o "$project/bin/libupt_godot.so" -L"$libraries" -lupt -Wl,-rpath,"$libraries"
 # The editor's first scan writes the list of extensions.
 mkdir -p "$project/.godot"

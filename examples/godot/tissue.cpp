@@ -40,7 +40,8 @@ static double length_of_step(const upt::Model &model, const Effort &effort) {
 
 Tissue::Tissue(const std::string &bundle, const Effort &effort)
     : model_(upt::Model::open(bundle)), step_s_(length_of_step(model_, effort)),
-      scene_(make_scene(model_, effort, step_s_)), clock_(step_s_) {
+      scene_(make_scene(model_, effort, step_s_)), clock_(step_s_), surgery_(model_) {
+  clock_.load([this](upt::Input &input, double moment) { load(input, moment); });
   try {
     upt_instrument far = upt::sphere(1.0F);
     far.position[0] = 1e4F;
@@ -77,43 +78,93 @@ static float up(float amplitude, double period, double now) {
 }
 
 void Tissue::breathe(float amplitude, double period) {
-  if (is_cut_ && amplitude != 0) {
-    throw std::runtime_error("breathe: the body has been cut");
+  if (surgery_.has_begun() && amplitude != 0) {
+    throw std::runtime_error("breathe: a tool changes the body");
   }
   if (!(period > 0.1) || !(std::fabs(amplitude) < 100)) {
     throw std::runtime_error("breathe: a period above 0.1 s and less than 100 mm");
   }
   amplitude_ = amplitude;
   period_ = period;
-  clock_.load([amplitude, period](upt::Input &input, double moment) {
-    const float position[3] = {0, 0, up(amplitude, period, moment)}, rotation[4] = {0, 0, 0, 1};
-    if (amplitude != 0) {
-      input.support(position, rotation);
-    }
-  });
+}
+
+// A step begins: where what holds the organ is then, and what the tool does to the body.
+void Tissue::load(upt::Input &input, double moment) {
+  if (amplitude_ != 0) {
+    const float position[3] = {0, 0, up(amplitude_, period_, moment)}, rotation[4] = {0, 0, 0, 1};
+    input.support(position, rotation);
+  }
+  if (surgery_.has_begun()) {
+    surgery_.operate(scene_, kind, in_hand ? &tool : nullptr, step_s_);
+  }
 }
 
 void Tissue::frame(double now) {
   height_ = solves_contact_ ? up(amplitude_, period_, now) : 0;
   upt_instrument framed = tool; // the library has it in the organ's frame
   framed.position[2] -= height_;
-  const upt::span<const upt_instrument> tools(&framed, in_hand ? 1 : 0);
+  const bool presses = kind == Kind::press;
+  const upt::span<const upt_instrument> tools(&framed, in_hand && presses ? 1 : 0);
   if (!solves_contact_) {
-    follow(now, tools);
+    follow(now, upt::span<const upt_instrument>(&framed, in_hand ? 1 : 0));
     return;
   }
-  if (is_cut_ || kind != Kind::press) {
+  if (!presses && !surgery_.has_begun()) {
     if (amplitude_ != 0) {
       throw std::runtime_error(
           "what holds the organ moves: breathe(0, 1) before a tool changes it");
     }
-    work(now, tools);
-    return;
+    wait();
+    surgery_.begin(scene_);
+    take_surface();
   }
-  clock_.frame(scene_, now, tools, displacement_);
+  if (surgery_.has_begun()) {
+    clock_.frame(scene_, now, tools, surgery_.surface(), displacement_);
+  } else {
+    clock_.frame(scene_, now, tools, displacement_);
+  }
+  if (taken_ != surgery_.changes()) {
+    take_surface();
+  }
   if (clock_.landed()) {
     const std::size_t in_step = clock_.landed_instruments();
     reading_ = in_step > 0 ? scene_.readings(in_step).front() : upt_instrument_reading{};
+  }
+  if (!presses) {
+    std::copy(surgery_.force().begin(), surgery_.force().end(), reading_.force);
+  }
+}
+
+bool Tissue::undo() {
+  wait();
+  const bool is_undone = surgery_.undo(scene_);
+  if (is_undone) {
+    take_surface();
+    // Until the next frame: the body's last state.
+    scene_.surface_positions(displacement_);
+    for (std::size_t i = 0; i < rest_.size(); i++) {
+      displacement_[i] -= rest_[i];
+    }
+  }
+  return is_undone;
+}
+
+// What is shown is the surface of the body as it is now: faces that were outside, then those that
+// were inside.
+void Tissue::take_surface() {
+  const upt::Surface &surface = surgery_.surface();
+  taken_ = surgery_.changes();
+  rest_ = surface.rest;
+  displacement_.resize(rest_.size());
+  faces_.clear();
+  for (std::uint8_t inside = 0; inside < 2; inside++) {
+    outside_ = faces_.size();
+    for (std::size_t slot = 0; slot < surface.inside.size(); slot++) {
+      const std::uint32_t *corners = &surface.triangles[3 * slot];
+      if (surface.inside[slot] == inside && corners[0] != corners[1]) {
+        faces_.insert(faces_.end(), corners, corners + 3);
+      }
+    }
   }
 }
 

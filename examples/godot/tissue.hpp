@@ -2,6 +2,7 @@
 // shows the surface at its own moment (upt::FrameClock). RAS, mm.
 #pragma once
 
+#include "surgery.hpp"
 #include "upt.hpp"
 
 #include <string>
@@ -14,10 +15,6 @@ struct Effort {
   std::int64_t substeps = 0;    // at most; from 2 with a target
   double step_s = 0;            // length of a step; zero with corrections: recommended for frames
 };
-
-// What the tool does: it touches the tissue, cuts along its way with an edge of 20 mm from its tip
-// up its axis, or takes what lies inside of the ball at its tip.
-enum class Kind { press, blade, aspirate };
 
 class Tissue {
 public:
@@ -41,11 +38,11 @@ public:
   // The body before the last stroke of a tool that changes it; false where there is none.
   bool undo();
   // How often the surface has changed: `rest` and `faces` are others then.
-  std::int64_t changes() const { return changes_; }
+  std::int64_t changes() const { return surgery_.changes(); }
   // Of `faces`, those that were on the intact body's surface come first: so many indices.
-  std::size_t outside() const { return is_cut_ ? outside_ : faces_.size(); }
-  float area() const { return area_; }       // that strokes have laid open, mm2
-  float removed() const { return removed_; } // that has left the body, mm3
+  std::size_t outside() const { return surgery_.has_begun() ? outside_ : faces_.size(); }
+  float area() const { return surgery_.area(); }       // that strokes have laid open, mm2
+  float removed() const { return surgery_.removed(); } // that has left the body, mm3
 
   const std::vector<float> &rest() const { return rest_; }                 // [n,3]
   const std::vector<float> &displacement() const { return displacement_; } // [n,3]
@@ -57,12 +54,8 @@ public:
 
 private:
   void follow(double now, upt::span<const upt_instrument> tools);
-  void work(double now, upt::span<const upt_instrument> tools);
-  void present(const upt::Input &framed, double since);
-  void operate(const upt_instrument *cutter);
-  void note(const upt_cut &made);
-  void end_stroke();
-  void follow_surface();
+  void load(upt::Input &input, double moment);
+  void take_surface();
 
   upt::Model model_;
   double step_s_;
@@ -79,20 +72,7 @@ private:
   std::vector<float> vectors_;
   std::uint64_t contact_count_ = 0, counted_steps_ = 0;
   // Of a body that a tool changes.
-  struct Before {
-    std::vector<std::uint8_t> snapshot;
-    float area, removed;
-  };
-  static constexpr std::size_t MOST_UNDONE = 16;
-  upt::Surface surface_;
-  std::vector<Before> undone_;
-  std::vector<std::uint8_t> before_; // the stroke that goes on, until it has done something
-  upt_instrument last_{};
-  Kind stroke_kind_ = Kind::press;
-  bool in_stroke_ = false, is_cut_ = false;
-  bool waits_ = false; // until the tool is lifted: its stroke has been taken back
-  std::uint32_t stroke_ = 0;
-  std::int64_t changes_ = 0;
-  std::size_t outside_ = 0, pressing_ = 0;
-  float area_ = 0, removed_ = 0;
+  Surgery surgery_;
+  std::int64_t taken_ = 0; // of its surfaces, the one that is shown
+  std::size_t outside_ = 0;
 };

@@ -1,15 +1,27 @@
-# Runs the simulator under a virtual display before and during a press and compares the pictures.
+# Runs the simulator under a virtual display before and during a press, with tools that change the
+# body and with an organ that breathes, and compares the pictures.
 #   simulator.sh SIMULATOR COMPARE BUNDLE FOLDER
 set -eu
-rm -f "$4/rest.png" "$4/pressed.png"
-for picture in rest:6 pressed:75; do
-  xvfb-run -a -s "-screen 0 1280x800x24" "$1" "$3" --headless --size 960x600 \
-    --frames "${picture#*:}" --screenshot "$4/${picture%:*}.png"
-done
-"$2" "$4/rest.png" "$4/pressed.png"
+program=$1 compare=$2 bundle=$3 folder=$4
+show() { # NAME FRAMES OPTION...
+  name=$1 frames=$2
+  shift 2
+  rm -f "$folder/$name.png"
+  xvfb-run -a -s "-screen 0 1280x800x24" "$program" "$bundle" --headless "$@" --size 960x600 \
+    --frames "$frames" --screenshot "$folder/$name.png"
+}
+show rest 6
+show pressed 75
+# Before the spatula presses the lip.
+show operated 168 --operate | tee "$folder/operated.txt"
+if ! grep -Eq '^cut [1-9][0-9]+ mm2, taken [1-9][0-9]+ mm3, hardened [1-9]' "$folder/operated.txt"; then
+  echo "a tool has changed nothing" >&2
+  exit 1
+fi
+"$compare" "$folder/rest.png" "$folder/pressed.png" "$folder/operated.png"
 # An organ that breathes is elsewhere.
-xvfb-run -a -s "-screen 0 1280x800x24" "$1" "$3" --headless --breathe --size 960x600 --frames 75 --screenshot "$4/breathing.png"
-if cmp -s "$4/pressed.png" "$4/breathing.png"; then
+show breathing 75 --breathe
+if cmp -s "$folder/pressed.png" "$folder/breathing.png"; then
   echo "the organ does not breathe" >&2
   exit 1
 fi
