@@ -14,7 +14,7 @@ use crate::memory::{self, HeldBytes};
 const LEAST_MM: f32 = 1.0;
 /// What lies deeper than this is looked for by the solid, mm.
 const PIERCED_MM: f32 = 4.0;
-/// A way out leans less than this (cosine) from a face that it goes along.
+/// A way out leans from the face that it leads to by at least this (cosine to its normal), or goes along it.
 const ALONG_FACE: f32 = 0.5;
 /// Ways out of the solid are looked for as far as this, mm.
 const LONGEST_MM: f32 = 30.0;
@@ -72,22 +72,31 @@ impl Buried {
         (length <= LONGEST_MM).then_some(direction * length)
     }
 
-    /// Where the tip of a thin tool has pierced the touchable surface, by no more than [`PIERCED_MM`].
-    pub fn tip(body: &Body, pose: &Pose, samples: &Samples, state: State<'_>) -> Option<Buried> {
-        deepest(body, pose, samples, state, 0.0).filter(|buried| buried.depth < PIERCED_MM)
-    }
-
-    /// Where the deepest probe of a tool comes out through the touchable surface; none where no probe lies in the tissue, or only
-    /// beneath a part of the surface that no tool touches.
-    pub fn find(
+    /// Where the tip of a thin tool has pierced the touchable surface, by no more than [`PIERCED_MM`]. Where that is in doubt, `is_inside` is asked
+    /// whether a probe lies in the tissue.
+    pub fn tip(
         body: &Body,
         pose: &Pose,
         samples: &Samples,
+        state: State<'_>,
+        is_inside: impl FnMut(Vector) -> bool,
+    ) -> Option<Buried> {
+        let least = 0.0;
+        deepest((body, pose), samples, state, least, is_inside)
+            .filter(|buried| buried.depth < PIERCED_MM)
+    }
+
+    /// Where the deepest probe of a tool comes out through the touchable surface; none where no probe lies in the tissue, or only
+    /// beneath a part of the surface that no tool touches. Beside the rims of a surface with lips none does.
+    pub fn find(
+        (body, pose): (&Body, &Pose),
+        (samples, has_lips): (&Samples, bool),
         mesh: &Mesh,
         state: State<'_>,
         sides: &mut Sides,
     ) -> Option<Buried> {
-        let buried = deepest(body, pose, samples, state, LEAST_MM.min(body.size()))?;
+        let least = LEAST_MM.min(body.size());
+        let buried = deepest((body, pose), samples, state, least, |_| !has_lips)?;
         let point = buried.point;
         let is_in =
             is_touchable(point, buried.depth, mesh, state) && is_inside(point, mesh, state, sides);
@@ -98,13 +107,14 @@ impl Buried {
 /// Probes whose nearest nodes are looked for at once.
 const AT_ONCE: usize = 8;
 
-/// The deepest of a tool's probes that lie more than `least` mm below the touchable surface.
+/// The deepest of a tool's probes that lie more than `least` mm below the touchable surface. One whose way out goes along the face that it leads
+/// to lies beside a rim of that surface, in the tissue or not: `is_inside` is asked.
 fn deepest(
-    body: &Body,
-    pose: &Pose,
+    (body, pose): (&Body, &Pose),
     samples: &Samples,
     state: State<'_>,
     least: f32,
+    mut is_inside: impl FnMut(Vector) -> bool,
 ) -> Option<Buried> {
     let mut deepest: Option<Buried> = None;
     let mut last = None;
@@ -139,16 +149,24 @@ fn deepest(
                 continue;
             }
             let point = Vector::new(x[at], y[at], z[at]);
-            let found = below(point, places[at], samples, state);
-            if found.is_some_and(|buried| buried.depth > depth) {
-                deepest = found;
+            if let Some((found, leans)) = below(point, places[at], samples, state)
+                && found.depth > depth
+                && (!leans || is_inside(point))
+            {
+                deepest = Some(found);
             }
         }
     }
 }
 
-/// The way out of a point that lies below the touchable surface where that is nearest, at the node in place `nearest` of the samples'.
-fn below(point: Vector, nearest: u32, samples: &Samples, state: State<'_>) -> Option<Buried> {
+/// The way out of a point that lies below the touchable surface where that is nearest, at the node in place `nearest` of the samples', and
+/// whether it goes along the face there.
+fn below(
+    point: Vector,
+    nearest: u32,
+    samples: &Samples,
+    state: State<'_>,
+) -> Option<(Buried, bool)> {
     let mut best: Option<(f32, usize, [f32; 3], Vector)> = None;
     let mut face_outward = Vector::ZERO;
     let mut outward = Vector::ZERO;
@@ -170,20 +188,21 @@ fn below(point: Vector, nearest: u32, samples: &Samples, state: State<'_>) -> Op
         }
     }
     let (_, face, [_, v, w], out) = best?;
-    // Above the surface there is no way out to be found. The mean of the faces' normals holds on edges and nodes too. A way along the
-    // face ends at a rim of the touchable surface, beside which the point lies: at the lips of a cut, whose walls no sample is on.
-    let along_face = ALONG_FACE * out.length() * face_outward.length();
-    if out.dot(outward) <= 0.0 || out.dot(face_outward) <= along_face {
+    // Above the surface there is no way out to be found. The mean of the faces' normals holds on edges and nodes too.
+    let along_normal = out.dot(face_outward);
+    if out.dot(outward) <= 0.0 || along_normal <= 0.0 {
         return None;
     }
     let i = (v * LATTICE as f32).round() as u32;
     let j = (w * LATTICE as f32).round() as u32;
-    Some(Buried {
+    let buried = Buried {
         out: out.try_normalize()?,
         depth: out.length(),
         row: samples.lattice_row(face, [i, j.min(LATTICE - i)])?,
         point,
-    })
+    };
+    let leans = along_normal < ALONG_FACE * buried.depth * face_outward.length();
+    Some((buried, leans))
 }
 
 /// Whether no part of the surface that tools do not touch is clearly nearer to a point than a touchable one, `depth` away.
@@ -194,7 +213,7 @@ fn is_touchable(point: Vector, depth: f32, mesh: &Mesh, state: State<'_>) -> boo
 }
 
 /// Whether a ray from a point leaves the surface more often than it enters it.
-fn is_inside(point: Vector, mesh: &Mesh, state: State<'_>, sides: &mut Sides) -> bool {
+pub(super) fn is_inside(point: Vector, mesh: &Mesh, state: State<'_>, sides: &mut Sides) -> bool {
     let mut leaves = 0i32;
     each_crossing((point, OBLIQUE), mesh, state, sides, |_, out| {
         leaves += if out { 1 } else { -1 };
@@ -298,7 +317,7 @@ mod tests {
                 start: &[],
             };
             let pose = Pose::from_translation(at.into());
-            Buried::tip(&body, &pose, &samples, state).map(|tip| (tip.depth, tip.out))
+            Buried::tip(&body, &pose, &samples, state, |_| false).map(|tip| (tip.depth, tip.out))
         };
         let (depth, out) = tip([12.0, 9.0, -1.5]).unwrap();
         assert!((depth - 1.5).abs() < 1e-5 && out.distance(Vector::Z) < 1e-5);

@@ -6,7 +6,6 @@ use super::gauge::Gauge;
 use super::surface::Surface;
 use super::tie_set::TieSet;
 use super::ways::ToolWays;
-use crate::contact::buried::Buried;
 use crate::contact::past::Past;
 use crate::contact::rows::WHAT;
 use crate::contact::rows::{Pair, Row, outward};
@@ -69,7 +68,7 @@ impl NearRows {
             let body = &ways.tools[index].body;
             if body.sinks_between(SPACING_MM) {
                 let at = ways.pose(index, part);
-                let tip = Buried::tip(body, &at, &surface.samples, state);
+                let tip = surface.tip(body, &at, state);
                 ways.buried[index] = tip.or(ways.buried[index]);
             }
         }

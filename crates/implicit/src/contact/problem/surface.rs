@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ::contact::{Body, Placed, Pose, Samples, Search};
 
 use crate::bundle::Mesh;
-use crate::contact::buried::{Buried, Sides};
+use crate::contact::buried::{Buried, Sides, is_inside};
 use crate::contact::rows::WHAT;
 use crate::contact::state::State;
 use crate::error::Result;
@@ -22,6 +22,8 @@ pub struct Surface {
     pub(super) search: Search,
     /// Room for rays through the surface.
     pub(super) sides: Sides,
+    /// The body has been cut open: no samples are on the walls of the cut, and the mesh's surface does not know them.
+    has_lips: bool,
 }
 
 impl Surface {
@@ -31,6 +33,8 @@ impl Surface {
         Ok(Surface {
             search: memory::tried(Search::with_room(&samples), WHAT)?,
             sides: Sides::new(mesh.node_count())?,
+            has_lips: (mesh.domain_nodes.iter())
+                .any(|node| mesh.surface_nodes.binary_search(node).is_err()),
             samples,
             mesh,
         })
@@ -38,8 +42,17 @@ impl Surface {
 
     /// Where a tool in the tissue comes out; none where it does not lie in it.
     pub(super) fn buried(&mut self, body: &Body, pose: &Pose, state: State<'_>) -> Option<Buried> {
+        let samples = (&*self.samples, self.has_lips);
+        Buried::find((body, pose), samples, &self.mesh, state, &mut self.sides)
+    }
+
+    /// Where the tip of a thin tool has pierced the surface.
+    pub(super) fn tip(&mut self, body: &Body, pose: &Pose, state: State<'_>) -> Option<Buried> {
         let (samples, mesh, sides) = (&self.samples, &self.mesh, &mut self.sides);
-        Buried::find(body, pose, samples, mesh, state, sides)
+        let has_lips = self.has_lips;
+        Buried::tip(body, pose, samples, state, |point| {
+            !has_lips && is_inside(point, mesh, state, sides)
+        })
     }
 
     /// Whether a sample lies inside of a tool where it is placed.
