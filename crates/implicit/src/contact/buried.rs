@@ -14,8 +14,11 @@ use crate::memory::{self, HeldBytes};
 const LEAST_MM: f32 = 1.0;
 /// What lies deeper than this is looked for by the solid, mm.
 const PIERCED_MM: f32 = 4.0;
-/// A way out leans from the face that it leads to by at least this (cosine to its normal), or goes along it.
-const ALONG_FACE: f32 = 0.5;
+/// A way out that makes less than this (cosine) with the normal of the face that it leads to may go along the face, to a rim of the touchable
+/// surface: the point lies beside the rim, in the tissue or not, ...
+const IN_DOUBT: f32 = 0.5;
+/// ... and with less than this is not beneath the surface.
+const ALONG_FACE: f32 = 0.25;
 /// Ways out of the solid are looked for as far as this, mm.
 const LONGEST_MM: f32 = 30.0;
 /// A unit direction along no axis or diagonal.
@@ -79,11 +82,13 @@ impl Buried {
         pose: &Pose,
         samples: &Samples,
         state: State<'_>,
-        is_inside: impl FnMut(Vector) -> bool,
+        mut is_inside: impl FnMut(Vector) -> bool,
     ) -> Option<Buried> {
         let least = 0.0;
-        deepest((body, pose), samples, state, least, is_inside)
-            .filter(|buried| buried.depth < PIERCED_MM)
+        deepest((body, pose), samples, state, least, |point, _| {
+            is_inside(point)
+        })
+        .filter(|buried| buried.depth < PIERCED_MM)
     }
 
     /// Where the deepest probe of a tool comes out through the touchable surface; none where no probe lies in the tissue, or only
@@ -96,7 +101,9 @@ impl Buried {
         sides: &mut Sides,
     ) -> Option<Buried> {
         let least = LEAST_MM.min(body.size());
-        let buried = deepest((body, pose), samples, state, least, |_| !has_lips)?;
+        let buried = deepest((body, pose), samples, state, least, |_, upright| {
+            !has_lips && upright > ALONG_FACE
+        })?;
         let point = buried.point;
         let is_in =
             is_touchable(point, buried.depth, mesh, state) && is_inside(point, mesh, state, sides);
@@ -107,14 +114,14 @@ impl Buried {
 /// Probes whose nearest nodes are looked for at once.
 const AT_ONCE: usize = 8;
 
-/// The deepest of a tool's probes that lie more than `least` mm below the touchable surface. One whose way out goes along the face that it leads
-/// to lies beside a rim of that surface, in the tissue or not: `is_inside` is asked.
+/// The deepest of a tool's probes that lie more than `least` mm below the touchable surface. Of one that may lie beside a rim of that surface
+/// `is_inside` is asked, with the cosine between its way out and the face's normal.
 fn deepest(
     (body, pose): (&Body, &Pose),
     samples: &Samples,
     state: State<'_>,
     least: f32,
-    mut is_inside: impl FnMut(Vector) -> bool,
+    mut is_inside: impl FnMut(Vector, f32) -> bool,
 ) -> Option<Buried> {
     let mut deepest: Option<Buried> = None;
     let mut last = None;
@@ -149,9 +156,9 @@ fn deepest(
                 continue;
             }
             let point = Vector::new(x[at], y[at], z[at]);
-            if let Some((found, leans)) = below(point, places[at], samples, state)
+            if let Some((found, upright)) = below(point, places[at], samples, state)
                 && found.depth > depth
-                && (!leans || is_inside(point))
+                && (upright >= IN_DOUBT || is_inside(point, upright))
             {
                 deepest = Some(found);
             }
@@ -159,14 +166,14 @@ fn deepest(
     }
 }
 
-/// The way out of a point that lies below the touchable surface where that is nearest, at the node in place `nearest` of the samples', and
-/// whether it goes along the face there.
+/// The way out of a point that lies below the touchable surface where that is nearest, at the node in place `nearest` of the samples', and the
+/// cosine between it and the normal of the face there.
 fn below(
     point: Vector,
     nearest: u32,
     samples: &Samples,
     state: State<'_>,
-) -> Option<(Buried, bool)> {
+) -> Option<(Buried, f32)> {
     let mut best: Option<(f32, usize, [f32; 3], Vector)> = None;
     let mut face_outward = Vector::ZERO;
     let mut outward = Vector::ZERO;
@@ -201,8 +208,8 @@ fn below(
         row: samples.lattice_row(face, [i, j.min(LATTICE - i)])?,
         point,
     };
-    let leans = along_normal < ALONG_FACE * buried.depth * face_outward.length();
-    Some((buried, leans))
+    let upright = along_normal / (buried.depth * face_outward.length());
+    Some((buried, upright))
 }
 
 /// Whether no part of the surface that tools do not touch is clearly nearer to a point than a touchable one, `depth` away.
