@@ -2,6 +2,7 @@
 
 mod link;
 mod motion;
+mod softened;
 mod stepped;
 mod tied;
 pub mod tissue;
@@ -17,6 +18,7 @@ pub use self::stepped::Stepped;
 
 use self::link::{FeltTool, HandLine, NearSamples};
 use self::motion::{Carried, ModalRoom};
+use self::softened::Softened;
 use self::tied::OwnTies;
 use super::HapticOptions;
 use super::ends::Ends;
@@ -84,6 +86,7 @@ pub fn join(
             sampled: memory::room(MOST_SAMPLES, WHAT)?,
         },
         delassus: Delassus::default(),
+        softened: Softened::default(),
         inertial_compliance: corrections.space.inertial_compliance(kappa)?,
         modal: ModalRoom {
             starts: prior.basis_starts()?,
@@ -182,8 +185,11 @@ impl Link {
         let all = ties.points(samples);
         let w = self.delassus.of(compliance, all, &self.near.sampled)?;
         let snapshot = self.line.out.buffer();
-        snapshot.delassus[..w.len()].copy_from_slice(w);
-        snapshot.delay_s = delay(w, masses);
+        let soft = (self.softened).factor(step, self.tool.instrument, (ties, samples))?;
+        let published = &mut snapshot.delassus[..w.len()];
+        published.copy_from_slice(w);
+        published.iter_mut().for_each(|w| *w *= soft);
+        snapshot.delay_s = delay(published, masses);
         let modes = self.modal.rows.len();
         for (at, sample) in of.enumerate() {
             let out = &mut snapshot.at_samples[3 * at * modes..3 * (at + 1) * modes];

@@ -6,6 +6,7 @@ use ::contact::{Body, Pose, Samples, Search};
 use exchange::{Reader, Writer};
 
 use super::motion::{Carried, ModalRoom};
+use super::softened::Softened;
 use super::tied::OwnTies;
 use crate::contact::Delassus;
 use crate::haptics::ends::Ends;
@@ -20,6 +21,8 @@ pub struct Link {
     pub(super) near: NearSamples,
     /// `W` of the published samples within [`super::AT_ONCE_S`]: natural modes are too slow to take part, and go on in the hand's thread.
     pub(super) delassus: Delassus,
+    /// What a cut makes softer.
+    pub(super) softened: Softened,
     /// What inertia takes off the compliance of each natural mode within [`super::AT_ONCE_S`], one number a mode.
     pub(super) inertial_compliance: Vec<f32>,
     pub(super) modal: ModalRoom,

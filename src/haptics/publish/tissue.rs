@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use ::contact::{Samples, Search};
 
+use super::softened::Softened;
 use super::{AT_ONCE_S, Link, WHAT};
 use crate::contact::Delassus;
 use crate::corrections::{Corrections, Integrator};
@@ -55,5 +56,6 @@ impl Link {
         self.modal.field = tissue.field;
         self.modal.masses = tissue.masses;
         self.delassus = Delassus::default();
+        self.softened = Softened::default();
     }
 }

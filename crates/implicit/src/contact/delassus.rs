@@ -71,6 +71,22 @@ impl Delassus {
         Ok((&self.w, is_new))
     }
 
+    /// Samples of the last call.
+    pub fn rows(&self) -> &[u32] {
+        &self.of
+    }
+
+    /// `f^T W f` under forces on them, mN mm.
+    pub fn work(&self, force: impl Fn(u32) -> Vector) -> f32 {
+        let blocks = self.w.chunks_exact(3 * self.of.len().max(1));
+        let on = self.of.iter().flat_map(|row| force(*row).to_array());
+        let moved = |line: &[f32]| -> f32 {
+            let all = self.of.iter().flat_map(|row| force(*row).to_array());
+            line.iter().zip(all).map(|(w, f)| w * f).sum()
+        };
+        blocks.zip(on).map(|(line, f)| f * moved(line)).sum()
+    }
+
     /// Makes `w` that of the samples; says whether it was another's.
     fn read(&mut self, compliance: Compliance<'_>, all: Points<'_>, rows: &[u32]) -> Result<bool> {
         if self.ties != all.generation {

@@ -90,6 +90,16 @@ impl Responses {
     pub fn exchange(&mut self, other: &mut Delassus) {
         std::mem::swap(&mut self.rest, other);
     }
+
+    /// Samples of the last solve that took the compliance of the tissue as it was deformed.
+    pub fn deformed(&self) -> &[u32] {
+        self.tangent.rows()
+    }
+
+    /// `f^T W f` under forces on them, mN mm.
+    pub fn work(&self, force: impl Fn(u32) -> Vector) -> f32 {
+        self.tangent.work(force)
+    }
 }
 
 /// See the module. `contacts` and `forces` are in the order of the rows.
