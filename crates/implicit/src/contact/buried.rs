@@ -14,11 +14,9 @@ use crate::memory::{self, HeldBytes};
 const LEAST_MM: f32 = 1.0;
 /// What lies deeper than this is looked for by the solid, mm.
 const PIERCED_MM: f32 = 4.0;
-/// A way out that makes less than this (cosine) with the normal of the face that it leads to may go along the face, to a rim of the touchable
-/// surface: the point lies beside the rim, in the tissue or not, ...
+/// A way out to a rim of the touchable surface that makes less than this (cosine) with the normal of the face there may go along the face: the
+/// point lies beside the rim, in the tissue or not. In a fold the way out leans too, but leads to no rim.
 const IN_DOUBT: f32 = 0.5;
-/// ... and with less than this is not beneath the surface.
-const ALONG_FACE: f32 = 0.25;
 /// Ways out of the solid are looked for as far as this, mm.
 const LONGEST_MM: f32 = 30.0;
 /// A unit direction along no axis or diagonal.
@@ -82,13 +80,11 @@ impl Buried {
         pose: &Pose,
         samples: &Samples,
         state: State<'_>,
-        mut is_inside: impl FnMut(Vector) -> bool,
+        is_inside: impl FnMut(Vector) -> bool,
     ) -> Option<Buried> {
         let least = 0.0;
-        deepest((body, pose), samples, state, least, |point, _| {
-            is_inside(point)
-        })
-        .filter(|buried| buried.depth < PIERCED_MM)
+        deepest((body, pose), samples, state, least, is_inside)
+            .filter(|buried| buried.depth < PIERCED_MM)
     }
 
     /// Where the deepest probe of a tool comes out through the touchable surface; none where no probe lies in the tissue, or only
@@ -101,9 +97,7 @@ impl Buried {
         sides: &mut Sides,
     ) -> Option<Buried> {
         let least = LEAST_MM.min(body.size());
-        let buried = deepest((body, pose), samples, state, least, |_, upright| {
-            !has_lips && upright > ALONG_FACE
-        })?;
+        let buried = deepest((body, pose), samples, state, least, |_| !has_lips)?;
         let point = buried.point;
         let is_in =
             is_touchable(point, buried.depth, mesh, state) && is_inside(point, mesh, state, sides);
@@ -115,13 +109,13 @@ impl Buried {
 const AT_ONCE: usize = 8;
 
 /// The deepest of a tool's probes that lie more than `least` mm below the touchable surface. Of one that may lie beside a rim of that surface
-/// `is_inside` is asked, with the cosine between its way out and the face's normal.
+/// `is_inside` is asked.
 fn deepest(
     (body, pose): (&Body, &Pose),
     samples: &Samples,
     state: State<'_>,
     least: f32,
-    mut is_inside: impl FnMut(Vector, f32) -> bool,
+    mut is_inside: impl FnMut(Vector) -> bool,
 ) -> Option<Buried> {
     let mut deepest: Option<Buried> = None;
     let mut last = None;
@@ -156,9 +150,9 @@ fn deepest(
                 continue;
             }
             let point = Vector::new(x[at], y[at], z[at]);
-            if let Some((found, upright)) = below(point, places[at], samples, state)
+            if let Some((found, in_doubt)) = below(point, places[at], samples, state)
                 && found.depth > depth
-                && (upright >= IN_DOUBT || is_inside(point, upright))
+                && (!in_doubt || is_inside(point))
             {
                 deepest = Some(found);
             }
@@ -166,14 +160,14 @@ fn deepest(
     }
 }
 
-/// The way out of a point that lies below the touchable surface where that is nearest, at the node in place `nearest` of the samples', and the
-/// cosine between it and the normal of the face there.
+/// The way out of a point that lies below the touchable surface where that is nearest, at the node in place `nearest` of the samples', and
+/// whether it leads along a face to a rim of the surface.
 fn below(
     point: Vector,
     nearest: u32,
     samples: &Samples,
     state: State<'_>,
-) -> Option<(Buried, f32)> {
+) -> Option<(Buried, bool)> {
     let mut best: Option<(f32, usize, [f32; 3], Vector)> = None;
     let mut face_outward = Vector::ZERO;
     let mut outward = Vector::ZERO;
@@ -194,7 +188,8 @@ fn below(
             face_outward = (b - a).cross(c - a);
         }
     }
-    let (_, face, [_, v, w], out) = best?;
+    let (_, face, weights, out) = best?;
+    let [_, v, w] = weights;
     // Above the surface there is no way out to be found. The mean of the faces' normals holds on edges and nodes too.
     let along_normal = out.dot(face_outward);
     if out.dot(outward) <= 0.0 || along_normal <= 0.0 {
@@ -208,8 +203,39 @@ fn below(
         row: samples.lattice_row(face, [i, j.min(LATTICE - i)])?,
         point,
     };
-    let upright = along_normal / (buried.depth * face_outward.length());
-    Some((buried, upright))
+    let is_along = along_normal < IN_DOUBT * buried.depth * face_outward.length();
+    let in_doubt = is_along && is_on_rim(samples, face, weights);
+    Some((buried, in_doubt))
+}
+
+/// Whether a point of a face lies on an edge that no other face has, or at a corner of one.
+fn is_on_rim(samples: &Samples, face: usize, weights: [f32; 3]) -> bool {
+    let corners = samples.corners(face);
+    let is_at = |corner: u32| (corners.iter().zip(weights)).any(|(c, w)| *c == corner && w > 0.0);
+    let is_single = |a: u32, b: u32| {
+        let faces = samples.faces_at(a).iter();
+        faces
+            .filter(|face| samples.corners(**face as usize).contains(&b))
+            .count()
+            == 1
+    };
+    let around = |corner: u32| {
+        let faces = samples.faces_at(corner).iter();
+        let others = faces.flat_map(|face| samples.corners(*face as usize));
+        others
+            .into_iter()
+            .any(|other| other != corner && is_single(corner, other))
+    };
+    let [a, b, c] = corners;
+    match weights.iter().filter(|weight| **weight > 0.0).count() {
+        1 => corners
+            .into_iter()
+            .any(|corner| is_at(corner) && around(corner)),
+        2 => [(a, b), (b, c), (c, a)]
+            .into_iter()
+            .any(|(p, q)| is_at(p) && is_at(q) && is_single(p, q)),
+        _ => false,
+    }
 }
 
 /// Whether no part of the surface that tools do not touch is clearly nearer to a point than a touchable one, `depth` away.
