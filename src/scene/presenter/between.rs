@@ -280,7 +280,7 @@ impl Between {
                     return Ok(Moves::Pushed);
                 }
             };
-            // Where the tissue goes on as it went a quick or thin tool may have lost it, as often as it is pressed: then it stays where the step left it.
+            // Where the tissue goes on as it went a quick or thin tool may have lost it, as often as it is pressed, or flung it: then it stays where the step left it.
             for pushed in [Moves::Pushed, Moves::Stays] {
                 if pushed == Moves::Stays {
                     let nodes = self.problem.surface.samples.nodes();
@@ -316,7 +316,11 @@ impl Between {
                     let nodes = (self.problem.surface.samples.nodes(), &*self.held);
                     self.touched.place(means, nodes, &self.free, Some(q))?;
                     if !(self.touched).has_lost(&mut self.problem, rest, last) {
-                        return Ok(pushed);
+                        if !self.touched.has_flung(&self.problem) {
+                            return Ok(pushed);
+                        }
+                        q.fill(0.0);
+                        break;
                     }
                     if press == MORE_PRESSES {
                         break;

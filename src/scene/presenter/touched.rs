@@ -11,6 +11,8 @@ use crate::prior::PriorTable;
 const WHAT: &str = "the present state of a scene";
 /// Tissue that lies deeper in a tool has lost the contact, mm.
 const KEPT_MM: f32 = 0.45;
+/// Contact that takes a node this much farther than a tool has gone has flung it, mm.
+const FLUNG_MM: f32 = 10.0;
 
 /// The surface that tools may touch.
 #[derive(HeldBytes)]
@@ -77,6 +79,16 @@ impl TouchedTissue {
             start: last,
         };
         problem.ways.may_lose() && problem.depths().sunk(state, 1.0) > KEPT_MM
+    }
+
+    /// Whether contact takes a node much farther than any tool goes in the frame: a thin tool among folds found a way out that leads elsewhere.
+    pub fn has_flung(&self, problem: &ContactProblem) -> bool {
+        let squares = (self.moved.as_chunks::<3>().0.iter()).map(|u| u.map(|x| x * x));
+        let farthest = squares
+            .map(|u| u.iter().sum())
+            .fold(0.0f32, f32::max)
+            .sqrt();
+        farthest > FLUNG_MM + problem.ways.longest()
     }
 
     /// The surface's displacement.

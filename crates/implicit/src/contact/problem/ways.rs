@@ -80,6 +80,13 @@ impl ToolWays {
         pose::between(&self.before[index], &self.tools[index].pose, part)
     }
 
+    /// The longest way of a point of a tool, mm.
+    pub fn longest(&self) -> f32 {
+        let ways = self.tools.iter().zip(&self.before);
+        let longest = ways.map(|(tool, before)| tool.body.motion(before, &tool.pose));
+        longest.fold(0.0, f32::max)
+    }
+
     /// Whether a tool is so quick or thin that this step may lose its contact.
     pub fn may_lose(&self) -> bool {
         self.may_lose.contains(&true)
