@@ -3,8 +3,7 @@
 //! The last step has solved its contact with the compliance of the body as it is, `W'`. Under the forces `f` of the tool then, the samples that it pushed go `f^T W' f / f^T W f` times as
 //! far as those of the intact body, both for the length of a step; all of `W` is scaled by that.
 
-use super::Stepped;
-use super::WHAT;
+use super::stepped::Stepped;
 use super::tied::OwnTies;
 use crate::contact::past::Force;
 use crate::contact::{Compliance, Delassus};
@@ -12,6 +11,7 @@ use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 use ::contact::{Samples, Vector};
 
+const WHAT: &str = "how soft a cut body is";
 /// A flap that hangs by little is softer yet: its own mass holds it between two steps.
 const MOST: f32 = 8.0;
 
