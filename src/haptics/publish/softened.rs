@@ -15,7 +15,7 @@ const WHAT: &str = "how soft a cut body is";
 /// A flap that hangs by little is softer yet: its own mass holds it between two steps.
 const MOST: f32 = 8.0;
 
-/// Room for how the intact body gives way in a step.
+/// Room for what the intact body does in a step.
 #[derive(Default, HeldBytes)]
 pub(super) struct Softened {
     /// What inertia takes off the compliance of each natural mode.
