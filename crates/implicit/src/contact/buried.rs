@@ -1,14 +1,12 @@
 //! Tools that lie in the tissue. Samples of the surface cannot show it, because none of them lies in such a tool. So a probe is tested
 //! against the solid that the whole surface bounds, and the tissue is moved along the shortest way out.
 
-use ::contact::friction::frame;
 use ::contact::samples::LATTICE;
 use ::contact::{Body, Pose, Samples, Vector};
 
+use super::solid::Solid;
 use super::state::State;
-use crate::bundle::Mesh;
-use crate::error::Result;
-use crate::memory::{self, HeldBytes};
+use crate::memory::HeldBytes;
 
 /// A tool whose middle lies less deep than this, or than its half thickness, is in contact and not in the tissue, mm.
 const LEAST_MM: f32 = 1.0;
@@ -19,25 +17,6 @@ const PIERCED_MM: f32 = 4.0;
 const IN_DOUBT: f32 = 0.5;
 /// Ways out of the solid are looked for as far as this, mm.
 const LONGEST_MM: f32 = 30.0;
-/// A unit direction along no axis or diagonal.
-const OBLIQUE: Vector = Vector::new(0.365_148, 0.547_723, 0.752_773);
-
-/// On which sides of two planes through a ray each node of the surface lies, by node: bits for above and below the one, and for above and below
-/// the other. Faces whose corners share a bit are not crossed.
-#[derive(Debug, HeldBytes)]
-pub(super) struct Sides(Vec<u8>);
-
-impl Sides {
-    /// Of a mesh with `count` nodes.
-    ///
-    /// # Errors
-    /// [`crate::Error::OutOfMemory`].
-    pub fn new(count: usize) -> Result<Sides> {
-        let mut sides = memory::room(count, "the sides of a ray")?;
-        sides.resize(count, 0);
-        Ok(Sides(sides))
-    }
-}
 
 /// Where a tool in the tissue comes out.
 #[derive(Clone, Copy, Debug, HeldBytes)]
@@ -54,20 +33,11 @@ pub(super) struct Buried {
 
 impl Buried {
     /// The way from the deepest probe out of the solid along a unit direction, mm; none where it is longer than [`LONGEST_MM`].
-    pub fn way_along(
-        &self,
-        direction: Vector,
-        mesh: &Mesh,
-        state: State<'_>,
-        sides: &mut Sides,
-    ) -> Option<Vector> {
-        // A direction along edges of a regular mesh would hit none of the faces there.
-        let tilted = (direction + 1e-3 * OBLIQUE).normalize();
+    pub fn way_along(&self, direction: Vector, mut solid: Solid<'_>) -> Option<Vector> {
         let mut length = f32::MAX;
-        let ray = (self.point, tilted);
-        each_crossing(ray, mesh, state, sides, |along, leaves| {
-            if leaves {
-                length = length.min(along);
+        solid.each_crossing(self.point, direction, |crossing| {
+            if crossing.leaves {
+                length = length.min(crossing.along);
             }
         });
         (length <= LONGEST_MM).then_some(direction * length)
@@ -88,19 +58,19 @@ impl Buried {
     }
 
     /// Where the deepest probe of a tool comes out through the touchable surface; none where no probe lies in the tissue, or only
-    /// beneath a part of the surface that no tool touches. Beside the rims of a surface with lips none does.
+    /// beneath a part of the surface that no tool touches, or where the tool went in through such a part. Beside the rims of a surface with lips none does.
     pub fn find(
         (body, pose): (&Body, &Pose),
         (samples, has_lips): (&Samples, bool),
-        mesh: &Mesh,
-        state: State<'_>,
-        sides: &mut Sides,
+        mut solid: Solid<'_>,
     ) -> Option<Buried> {
         let least = LEAST_MM.min(body.size());
-        let buried = deepest((body, pose), samples, state, least, |_| !has_lips)?;
+        let tool = (body, pose);
+        let buried = deepest(tool, samples, solid.state, least, |_| !has_lips)?;
         let point = buried.point;
-        let is_in =
-            is_touchable(point, buried.depth, mesh, state) && is_inside(point, mesh, state, sides);
+        let is_in = !solid.is_nearer(point, buried.depth)
+            && solid.is_inside(point)
+            && !solid.is_left_elsewhere(tool, point, samples.nodes());
         is_in.then_some(buried)
     }
 }
@@ -235,59 +205,6 @@ fn is_on_rim(samples: &Samples, face: usize, weights: [f32; 3]) -> bool {
             .into_iter()
             .any(|(p, q)| is_at(p) && is_at(q) && is_single(p, q)),
         _ => false,
-    }
-}
-
-/// Whether no part of the surface that tools do not touch is clearly nearer to a point than a touchable one, `depth` away.
-fn is_touchable(point: Vector, depth: f32, mesh: &Mesh, state: State<'_>) -> bool {
-    let nodes = mesh.surface_nodes.iter();
-    let squares = nodes.map(|node| state.position(*node).distance_squared(point));
-    depth <= 1.5 * squares.fold(f32::MAX, f32::min).sqrt()
-}
-
-/// Whether a ray from a point leaves the surface more often than it enters it.
-pub(super) fn is_inside(point: Vector, mesh: &Mesh, state: State<'_>, sides: &mut Sides) -> bool {
-    let mut leaves = 0i32;
-    each_crossing((point, OBLIQUE), mesh, state, sides, |_, out| {
-        leaves += if out { 1 } else { -1 };
-    });
-    leaves != 0
-}
-
-/// Calls with how far along a ray from a point it crosses a face of the whole surface, mm, and whether it leaves the solid there.
-fn each_crossing(
-    (point, ray): (Vector, Vector),
-    mesh: &Mesh,
-    state: State<'_>,
-    sides: &mut Sides,
-    mut take: impl FnMut(f32, bool),
-) {
-    let across = frame(ray);
-    let (e, f) = (across.y_axis, across.z_axis);
-    for &node in &mesh.surface_nodes {
-        let at = state.position(node) - point;
-        let side = |x: f32| u8::from(x > 0.0) | u8::from(x < 0.0) << 1;
-        sides.0[node as usize] = side(at.dot(e)) | side(at.dot(f)) << 2;
-    }
-    let is_beside = |at: [f32; 3]| at.iter().all(|x| *x > 0.0) || at.iter().all(|x| *x < 0.0);
-    for face in mesh.surface_faces.as_chunks::<3>().0 {
-        // Most faces lie on one side of a plane through the ray.
-        let [a, b, c] = face.map(|node| sides.0[node as usize]);
-        if a & b & c != 0 {
-            continue;
-        }
-        let corners = face.map(|node| state.position(node) - point);
-        let [x, y] = [e, f].map(|axis| corners.map(|corner| corner.dot(axis)));
-        let side = |i: usize, j: usize| x[i] * y[j] - y[i] * x[j];
-        let [u, v, w] = [side(1, 2), side(2, 0), side(0, 1)];
-        let is_hit = is_beside([u, v, w]);
-        if is_hit {
-            let [a, b, c] = corners;
-            let along = (u * a + v * b + w * c).dot(ray) / (u + v + w);
-            if along > 0.0 {
-                take(along, u > 0.0);
-            }
-        }
     }
 }
 

@@ -26,6 +26,7 @@ mod inertial_compliance;
 pub mod past;
 pub mod problem;
 pub mod rows;
+mod solid;
 pub mod state;
 mod stored;
 pub mod ties;

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use ::contact::{Body, Placed, Pose, Samples, Search};
 
 use crate::bundle::Mesh;
-use crate::contact::buried::{Buried, Sides, is_inside};
+use crate::contact::buried::Buried;
 use crate::contact::rows::WHAT;
+use crate::contact::solid::{Sides, Solid};
 use crate::contact::state::State;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
@@ -43,15 +44,16 @@ impl Surface {
     /// Where a tool in the tissue comes out; none where it does not lie in it.
     pub(super) fn buried(&mut self, body: &Body, pose: &Pose, state: State<'_>) -> Option<Buried> {
         let samples = (&*self.samples, self.has_lips);
-        Buried::find((body, pose), samples, &self.mesh, state, &mut self.sides)
+        let solid = Solid::of(&self.mesh, state, &mut self.sides);
+        Buried::find((body, pose), samples, solid)
     }
 
     /// Where the tip of a thin tool has pierced the surface.
     pub(super) fn tip(&mut self, body: &Body, pose: &Pose, state: State<'_>) -> Option<Buried> {
-        let (samples, mesh, sides) = (&self.samples, &self.mesh, &mut self.sides);
-        let has_lips = self.has_lips;
+        let (samples, has_lips) = (&self.samples, self.has_lips);
+        let mut solid = Solid::of(&self.mesh, state, &mut self.sides);
         Buried::tip(body, pose, samples, state, |point| {
-            !has_lips && is_inside(point, mesh, state, sides)
+            !has_lips && solid.is_inside(point)
         })
     }
 

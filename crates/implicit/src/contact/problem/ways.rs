@@ -10,6 +10,7 @@ use super::work::Work;
 use crate::contact::buried::Buried;
 use crate::contact::past::{Force, Past};
 use crate::contact::rows::{OPEN_MM, WHAT};
+use crate::contact::solid::Solid;
 use crate::contact::state::State;
 use crate::contact::tool::{MAX_TOOLS, Tool};
 use crate::contact::tool_use::ToolUse;
@@ -208,8 +209,8 @@ impl ToolWays {
             };
             let way = found.map_or(Vector::ZERO, |buried| {
                 let back = came.try_normalize();
-                let (mesh, sides) = (&surface.mesh, &mut surface.sides);
-                let back = back.and_then(|back| buried.way_along(back, mesh, state, sides));
+                let solid = Solid::of(&surface.mesh, state, &mut surface.sides);
+                let back = back.and_then(|back| buried.way_along(back, solid));
                 let way = back.unwrap_or(buried.out * buried.depth);
                 way + way.normalize_or_zero() * clear
             });
