@@ -14,6 +14,8 @@ use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the forces of instruments";
+/// See [`Past::is_wedged`].
+const WEDGED: f32 = 10.0;
 
 /// The force on one sample, mN.
 #[derive(Clone, Copy, Debug, PartialEq, HeldBytes, Serialize, Deserialize)]
@@ -88,6 +90,24 @@ impl Past {
     /// Whether tools push.
     pub fn tools_push(&self) -> bool {
         self.forces.iter().any(|force| force.tool != NO_TOOL)
+    }
+
+    /// Whether the forces of a tool that pushed `before` hold little but each other: they are [`WEDGED`] times as large as those, and as their own sum. Two rows on
+    /// opposite sides of a thin tool, on tissue between which nothing gives way, drive each other apart so.
+    pub fn is_wedged(&self, before: &Past) -> bool {
+        let all = |past: &Past, index: usize| {
+            let own = past.forces.iter();
+            let own = own.filter(|force| force.tool == index as u32);
+            own.fold((0.0, Vector::ZERO), |(length, sum), force| {
+                (length + force.force.length(), sum + force.force)
+            })
+        };
+        let mut tools = self.tools.iter().enumerate();
+        tools.any(|(index, held)| {
+            let ((length, sum), (then, _)) = (all(self, index), all(before, index));
+            let holds = !held.grasp.anchors().is_empty();
+            !holds && then > 0.0 && length > WEDGED * then.max(sum.length())
+        })
     }
 
     /// Whether a grasper holds a sample.
@@ -213,5 +233,34 @@ impl Past {
         self.tools.clear();
         self.ties.clear();
         self.forces.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn forces_that_hold_little_but_each_other_are_a_wedge() {
+        let of = |forces: &[[f32; 3]]| Past {
+            tools: vec![Held::default()],
+            forces: (0..)
+                .zip(forces)
+                .map(|(sample, force)| Force {
+                    tool: 0,
+                    sample,
+                    force: (*force).into(),
+                })
+                .collect(),
+            ties: Vec::new(),
+        };
+        let before = of(&[[0.0, 0.0, -300.0]]);
+        let wedge = of(&[[0.0, 0.0, -28_500.0], [0.0, 0.0, 28_600.0]]);
+        assert!(wedge.is_wedged(&before));
+        // A fold held from both sides, a blow, and a tool that meets the tissue now.
+        assert!(!of(&[[900.0, 0.0, 0.0], [-900.0, 0.0, 0.0]]).is_wedged(&before));
+        assert!(!of(&[[0.0, 0.0, -60_000.0]]).is_wedged(&before));
+        assert!(!wedge.is_wedged(&of(&[])));
+        assert!(!wedge.is_wedged(&wedge));
     }
 }

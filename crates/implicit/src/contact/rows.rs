@@ -29,7 +29,7 @@ const GRAZED_MM: f32 = 0.1;
 /// A force this near (cosine) to the normal of a broad tool's nearest face comes from there, friction and all.
 const SAME_FACE: f32 = 0.7;
 /// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
-const LEAN: f32 = 0.2;
+pub(super) const LEAN: f32 = 0.2;
 
 /// A sample that is looked at.
 #[derive(Clone, Copy, Debug, HeldBytes)]

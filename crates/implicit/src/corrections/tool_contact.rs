@@ -154,9 +154,15 @@ impl ToolStep<'_> {
             size = self.recover(at)?;
         }
         // A state in balance may still have lost the tool: a thin one has gone through the surface.
-        let left = sunk(self.input, self.problem, at.u, 1.0);
+        let mut left = sunk(self.input, self.problem, at.u, 1.0);
+        if left > SUNK_MM && is_sound(size, at.det) && self.may_begin_again() {
+            // The guess has lost it: tissue that swings goes on past a small tool.
+            self.begin_again(at)?;
+            size = self.improve_loaded(at)?;
+            left = sunk(self.input, self.problem, at.u, 1.0);
+        }
         if !is_sound(size, at.det) || left > SUNK_MM {
-            self.fall_back(at)?;
+            self.fall_back(at, left)?;
         }
         self.report.min_det = at.det;
         Ok(())
@@ -332,9 +338,12 @@ fn state<'a>(input: &Input<'a>, u: &'a [f32]) -> State<'a> {
     }
 }
 
-/// How deep tissue `u` and the tools lie in each other, at part `way` of their way, mm.
+/// How deep tissue `u` and the tools lie in each other, at part `way` of their way, mm; without bounds where forces are no contact.
 fn sunk(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) -> f32 {
-    problem.depths().sunk(state(input, u), way)
+    match problem.next.is_wedged(&problem.past) {
+        true => f32::MAX,
+        false => problem.depths().sunk(state(input, u), way),
+    }
 }
 
 /// How deep tools and tissue lie in each other in a state of linear elasticity; without bounds where that goes too far.

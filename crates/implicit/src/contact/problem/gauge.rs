@@ -5,8 +5,7 @@ use ::contact::{Samples, Vector};
 use super::tie_set::TieSet;
 use super::ways::ToolWays;
 use crate::contact::past::{Force, Past};
-use crate::contact::rows::OPEN_MM;
-use crate::contact::rows::{Moving, Row, outward};
+use crate::contact::rows::{LEAN, Moving, OPEN_MM, Row, outward};
 use crate::contact::state::State;
 use crate::contact::ties::Points;
 
@@ -57,15 +56,16 @@ impl<'a> Gauge<'a> {
         }
     }
 
-    /// Whether forces of a tool are at its surface, and none where the tissue has left it.
+    /// Whether forces of a tool are at its surface, each on tissue that faces the tool there, and none where the tissue has left it.
     pub fn pushes_from_outside(&self, index: usize, state: State<'_>, part: f32) -> bool {
         let own = |force: &&Force| force.tool == index as u32;
         let mut forces = self.next.forces.iter().filter(own).peekable();
         let moving = self.moving(state, part);
-        let gap = |force: &Force| {
+        let is_outside = |force: &Force| {
             let row = self.row(force.tool, force.sample, force.force, state);
-            moving.contact(&row, part).gap
+            let contact = moving.contact(&row, part);
+            contact.gap < OPEN_MM && contact.normal.dot(row.outward) <= LEAN
         };
-        forces.peek().is_some() && forces.all(|force| gap(force) < OPEN_MM)
+        forces.peek().is_some() && forces.all(is_outside)
     }
 }

@@ -8,7 +8,7 @@ use crate::error::Result;
 
 impl ToolStep<'_> {
     /// The first of the three in which the contact holds, or that in which it is lost by least.
-    pub(super) fn fall_back(&mut self, at: &mut Iterate<'_>) -> Result<()> {
+    pub(super) fn fall_back(&mut self, at: &mut Iterate<'_>, found_left: f32) -> Result<()> {
         self.report.fell_back = true;
         self.solver.clear_pairs();
         // A state whose elements are sound though its contact is lost.
@@ -35,7 +35,11 @@ impl ToolStep<'_> {
         if left > SUNK_MM {
             // As it was, under the forces that held it there.
             self.problem.stay();
-            if lost_by(self.input, self.problem, self.input.last) <= left {
+            let stayed = lost_by(self.input, self.problem, self.input.last);
+            if found_sound && found_left < left.min(stayed) {
+                return self.take_found(at);
+            }
+            if stayed <= left {
                 return self.stay(at);
             }
         }
@@ -51,9 +55,7 @@ impl ToolStep<'_> {
             return Ok(());
         }
         if found_sound {
-            self.problem.kept.take_sound(&mut self.problem.next);
-            at.u.copy_from_slice(&self.solver.fields.d);
-            self.evaluate(at)?;
+            self.take_found(at)?;
         } else if !self.input.still {
             self.stay(at)?;
         }
@@ -62,6 +64,13 @@ impl ToolStep<'_> {
         }
         self.problem.kept.take_guess(&mut self.problem.next);
         at.u.copy_from_slice(&self.solver.fields.guess);
+        self.evaluate(at)
+    }
+
+    /// The state that the iterations had come to.
+    fn take_found(&mut self, at: &mut Iterate<'_>) -> Result<()> {
+        self.problem.kept.take_sound(&mut self.problem.next);
+        at.u.copy_from_slice(&self.solver.fields.d);
         self.evaluate(at)
     }
 

@@ -31,11 +31,7 @@ impl ToolStep<'_> {
             return Ok(f64::INFINITY);
         }
         if was_sound {
-            self.stay(at)?;
-            if !self.context.corrections.groups.is_empty() {
-                lift(self.context, self.input, Some(self.input.last), at.u)?;
-                self.evaluate(at)?;
-            }
+            self.begin_again(at)?;
         } else {
             // What the last state and this one make of a velocity is none.
             self.report.fell_back = true;
@@ -56,5 +52,23 @@ impl ToolStep<'_> {
             }
         }
         self.improve_loaded(at)
+    }
+
+    /// The last state where the boundary has gone since, with the forces that it had.
+    pub(super) fn begin_again(&mut self, at: &mut Iterate<'_>) -> Result<()> {
+        self.stay(at)?;
+        if self.context.corrections.groups.is_empty() {
+            return Ok(());
+        }
+        lift(self.context, self.input, Some(self.input.last), at.u)?;
+        self.evaluate(at)
+    }
+
+    /// Whether iterations may begin with the last state where those from the guess have lost a tool: its elements are sound, a tool pushed it, and none has
+    /// been put elsewhere.
+    pub(super) fn may_begin_again(&self) -> bool {
+        let was_sound = self.solver.motion.min_det >= SMALLEST_DET && !self.input.still;
+        let leapt = self.problem.ways.has_leapt;
+        was_sound && !leapt && self.problem.past.tools_push() && !self.problem.work.is_spent()
     }
 }
