@@ -13,7 +13,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use contact::{Shape, Vector};
-use measure::{Row, median, relative_l2};
+use gauge::median;
+use measure::{Row, relative_l2};
 use upt::contact::Tool;
 use upt::{Contact, Corrections, Model, ModelOptions, Scene, SceneOptions, StepInput};
 
@@ -132,13 +133,13 @@ fn steps(model: &Arc<Model>, name: &str) -> upt::Result<()> {
             // The better of three runs of the path: what other programs take is not the step's.
             let mut best: Option<(f64, Taken)> = None;
             for _ in 0..3 {
-                let mut taken = take(model, &way, k, threads)?;
-                let ms = median(&mut taken.step);
+                let taken = take(model, &way, k, threads)?;
+                let ms = median(&taken.step);
                 if best.as_ref().is_none_or(|(least, _)| ms < *least) {
                     best = Some((ms, taken));
                 }
             }
-            let Some((ms, mut taken)) = best else {
+            let Some((ms, taken)) = best else {
                 continue;
             };
             let error = relative_l2(&taken.fields.concat(), &exact.fields.concat());
@@ -157,9 +158,9 @@ fn steps(model: &Arc<Model>, name: &str) -> upt::Result<()> {
                 .error(error)
                 .limits(bar, goal)
                 .print();
-            let contact = median(&mut taken.contact);
+            let contact = median(&taken.contact);
             Row::new(format!("{title}/contact in it"), contact, "ms").print();
-            let rest = ms - median(&mut taken.corrections);
+            let rest = ms - median(&taken.corrections);
             Row::new(format!("{title}/outside of the corrections"), rest, "ms").print();
         }
     }

@@ -63,13 +63,7 @@ pub fn medians(rivals: &mut [Box<dyn FnMut() + '_>]) -> Vec<f64> {
             times.push(timed(rival, calls));
         }
     }
-    times.iter_mut().map(|times| median(times)).collect()
-}
-
-/// The middle one; sorts them.
-pub fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    times.into_iter().map(gauge::median).collect()
 }
 
 /// Largest difference, relative to the largest of `want`.

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
+use gauge::resident_bytes;
 use upt::bundle::Mesh;
 use upt::{Model, Scene, SceneOptions};
 
-use super::measure::{Row, median, quick};
+use super::measure::{Row, quick};
 use super::{options, patch, push};
 
 pub fn against_bundle_mesh(model: &Arc<Model>, name: &str) -> upt::Result<()> {
@@ -60,7 +61,7 @@ pub fn against_bundle_mesh(model: &Arc<Model>, name: &str) -> upt::Result<()> {
         .limits(Some(300.0), Some(150.0))
         .print();
     }
-    let [own_ms, fine_ms] = times.map(|mut times| median(&mut times));
+    let [own_ms, fine_ms] = times.map(gauge::median);
     println!(
         "{name}, {count} surface nodes, 1 thread: K = {} {own_ms:.2} ms, K = {} {fine_ms:.2} ms",
         own.node_count(),
@@ -84,12 +85,4 @@ pub fn against_bundle_mesh(model: &Arc<Model>, name: &str) -> upt::Result<()> {
 fn spread(mesh: &Mesh, count: usize) -> Vec<u32> {
     let nodes = &mesh.surface_nodes;
     (0..count).map(|i| nodes[i * nodes.len() / count]).collect()
-}
-
-/// Resident memory of this process (Linux).
-fn resident_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
-    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(1024 * kilobytes)
 }

@@ -5,12 +5,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use gauge::median;
 use upt::bundle::TensorFile;
 use upt::model::UptModel;
 use upt::onnx::ProviderPlan;
 use upt::{Contact, Error, Model, Scene, SceneOptions, StepInput};
 
-use super::measure::{Row, budget, median, quick, relative_error, relative_l2};
+use super::measure::{Row, budget, quick, relative_error, relative_l2};
 use super::options;
 use super::split::Split;
 
@@ -135,5 +136,5 @@ pub fn in_turns(
         )?;
         ours.push(start.elapsed().as_secs_f64() * 1e3);
     }
-    Ok((median(&mut ours), median(&mut theirs)))
+    Ok((median(ours), median(theirs)))
 }

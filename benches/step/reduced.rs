@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use gauge::median;
 use upt::{Model, Scene};
 
-use super::measure::{Row, median, quick};
+use super::measure::{Row, quick};
 use super::{options, patch, push};
 
 fn steps() -> usize {
@@ -25,7 +26,7 @@ pub fn site_change(model: &Arc<Model>, name: &str) -> upt::Result<()> {
         };
         times.push(scene.stats().prior_ms);
     }
-    let extra = median(&mut new) - median(&mut same);
+    let extra = median(new) - median(same);
     Row::new(
         format!("{name}/site change, {} nodes", patches[0].len()),
         extra,

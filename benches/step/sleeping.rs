@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use upt::{Model, Scene, SceneOptions};
 
-use super::measure::{Row, median, quick};
+use super::measure::{Row, quick};
 use super::{FREE, options};
 
 /// Steps within which a trained bundle falls asleep; random weights may never do.
@@ -29,7 +29,7 @@ pub fn measure(model: &Arc<Model>, name: &str) -> upt::Result<()> {
     if !scene.stats().sleeping {
         return Ok(());
     }
-    let mut times: Vec<f64> = (0..if quick() { 100 } else { 1000 })
+    let times: Vec<f64> = (0..if quick() { 100 } else { 1000 })
         .map(|_| {
             let start = Instant::now();
             scene
@@ -37,7 +37,7 @@ pub fn measure(model: &Arc<Model>, name: &str) -> upt::Result<()> {
                 .map(|()| start.elapsed().as_secs_f64() * 1e6)
         })
         .collect::<upt::Result<_>>()?;
-    Row::new(format!("{name}/sleeping step"), median(&mut times), "us")
+    Row::new(format!("{name}/sleeping step"), gauge::median(times), "us")
         .limits(Some(10.0), None)
         .print();
     Ok(())

@@ -2,13 +2,14 @@
 
 use std::time::{Duration, Instant};
 
+use gauge::{Sorted, median};
 use upt::Scene;
 
 use super::bare::BareLoop;
 use super::cost::Cost;
-use super::measure::{Row, budget, median, quick};
+use super::measure::{Row, budget, quick};
 use super::tail::Tail;
-use super::windows::{Steady, p99};
+use super::windows::Steady;
 use super::{patch, pushed};
 use upt::{Contact, Kind};
 
@@ -75,22 +76,19 @@ pub fn measure(
         }
     }
     let steady = Steady::of(&times, &bare);
-    let middle = median(&mut times);
-    let bare_middle = median(&mut bare);
+    let over_median = |values: &Sorted| values.quantile(0.99) / values.median();
+    let (times, bare) = (Sorted::of(times), Sorted::of(bare));
+    let middle = times.median();
     let rival = idle.as_ref().map_or("", |bare| bare.name());
     Row::new(format!("{name}/step"), middle, "ms")
         .limits(bar, goal)
         .print();
-    Row::new(
-        format!("{name}/p99 over median"),
-        p99(&mut times) / middle,
-        "",
-    )
-    .limits(Some(1.5), Some(1.2))
-    .print();
+    Row::new(format!("{name}/p99 over median"), over_median(&times), "")
+        .limits(Some(1.5), Some(1.2))
+        .print();
     Row::new(
         format!("{name}/p99 over median, {rival}"),
-        p99(&mut bare) / bare_middle,
+        over_median(&bare),
         "",
     )
     .print();
@@ -108,7 +106,7 @@ pub fn measure(
     );
     Row::new(
         format!("{name}/outside kernels and sessions"),
-        median(&mut outside),
+        median(&outside),
         "%",
     )
     .limits(Some(5.0), Some(2.0))

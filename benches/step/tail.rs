@@ -2,7 +2,7 @@
 
 use upt::SceneStats;
 
-use super::measure::median;
+use gauge::median;
 
 const STAGES: [&str; 8] = [
     "check",
@@ -57,7 +57,7 @@ impl Tail {
             mean(&|step| step.0) - middle
         );
         for (at, name) in STAGES.iter().enumerate() {
-            let usual = median(&mut self.steps.iter().map(|step| step.1[at]).collect::<Vec<_>>());
+            let usual = median(self.steps.iter().map(|step| step.1[at]));
             let excess = mean(&|step| step.1[at]) - usual;
             if excess.abs() > 0.01 * middle {
                 text += &format!(", {name} {excess:+.3}");

@@ -4,7 +4,7 @@
 //! tells when they were at work: the steps are cut into windows of [`WINDOW`], and those count in which the loop's own
 //! longest run stayed within [`STEADY`] of its median. Each step is compared with the median step of its window.
 
-use super::measure::median;
+use gauge::{Sorted, median};
 
 /// Steps in a window, and as many runs of the bare loop.
 const WINDOW: usize = 20;
@@ -27,21 +27,15 @@ impl Steady {
         let mut ratios = Vec::new();
         for (steps, bare) in steps.chunks_exact(WINDOW).zip(bare.chunks_exact(WINDOW)) {
             let longest = bare.iter().copied().fold(0.0, f64::max);
-            if longest <= STEADY * median(&mut bare.to_vec()) {
-                let middle = median(&mut steps.to_vec());
+            if longest <= STEADY * median(bare) {
+                let middle = median(steps);
                 ratios.extend(steps.iter().map(|step| step / middle));
             }
         }
         Self {
-            p99: (ratios.len() >= LEAST).then(|| p99(&mut ratios)),
+            p99: (ratios.len() >= LEAST).then(|| Sorted::of(&ratios).quantile(0.99)),
             counted: ratios.len() / WINDOW,
             windows: steps.len() / WINDOW,
         }
     }
-}
-
-/// The 99th of a hundred; sorts.
-pub fn p99(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[(values.len() * 99).div_ceil(100) - 1]
 }

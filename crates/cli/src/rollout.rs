@@ -135,9 +135,7 @@ fn print(
     estimates: &[Option<f32>],
     forces: &[Option<Forces>],
 ) -> Result<()> {
-    let mut sorted = times.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let median = sorted[sorted.len() / 2];
+    let median = gauge::median(times);
     if options.json {
         let report = json!({
             "trajectory": options.trajectory, "bundle": options.bundle, "scheme": trajectory.header.scheme,

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 use contact::Vector;
+use gauge::median;
 use serde::Serialize;
 use tissue::hang::Hang;
 use tissue::schemes::FRAME_S;
@@ -13,7 +14,6 @@ use tissue::solver::Solver;
 use upt::{Loads, StepInput};
 
 use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
-use crate::quantile::median;
 use crate::report::options::Options;
 use crate::table::Column;
 use host::Effort;

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 use contact::{Body, Pose, Vector, pose};
+use gauge::median;
 use serde::Serialize;
 use tissue::load_programmes::{LoadProgramme, LoadSizes};
 use tissue::simulate::{ToolOrder, simulate_loads, simulate_tools};
@@ -14,7 +15,6 @@ use tissue::trajectory::Trajectory;
 use upt::{Contact, Loads, Pressure, StepInput, SupportPose, Tool};
 
 use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
-use crate::quantile::median;
 use crate::report::options::Options;
 use crate::table::Column;
 use host::Effort;

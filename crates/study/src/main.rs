@@ -14,8 +14,6 @@ mod hang_report;
 mod haptics;
 mod load_report;
 mod mobilise_report;
-mod processor_time;
-mod quantile;
 mod report;
 mod shown;
 mod soak;

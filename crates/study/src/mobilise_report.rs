@@ -8,6 +8,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
 use contact::{Rotation, Shape, Vector};
+use gauge::median;
 use host::Effort;
 use serde::Serialize;
 use serde_json::json;
@@ -18,7 +19,6 @@ use upt::{Contact, GroupMotion, Loads, StepInput, SupportPose, Tool};
 use yardstick::manifest::Manifest;
 
 use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
-use crate::quantile::median;
 use crate::report::options::Options;
 use crate::table::Column;
 

@@ -6,10 +6,10 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use gauge::resident_bytes;
 use tissue::schemes::{Programme, Scheme};
 
 use crate::bench::Bench;
-use crate::report::memory::resident_bytes;
 
 #[derive(clap::Args)]
 #[command(

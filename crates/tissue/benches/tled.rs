@@ -133,12 +133,11 @@ fn measure(criterion: &mut Criterion, setting: &Setting) {
             });
         },
     );
-    let mut seconds = seconds.into_inner();
+    let seconds = seconds.into_inner();
     if seconds.is_empty() {
         return;
     }
-    seconds.sort_by(f64::total_cmp);
-    let median = seconds[seconds.len() / 2];
+    let median = gauge::median(seconds);
     let steps = f64::from(steps.into_inner());
     let step = median / steps;
     println!(

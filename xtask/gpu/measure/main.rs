@@ -241,8 +241,8 @@ fn papers(bundle: &Path, reference: &Way, provider: Provider, steps: usize) -> R
     Ok(vec![row])
 }
 
-fn percentiles(mut times: Vec<f64>) -> Value {
-    times.sort_by(f64::total_cmp);
-    let at = |percent: usize| times[(times.len() * percent).div_ceil(100).max(1) - 1];
-    json!({"p50_ms": at(50), "p95_ms": at(95), "p99_ms": at(99), "steps": times.len()})
+fn percentiles(times: Vec<f64>) -> Value {
+    let times = gauge::Sorted::of(times);
+    let at = |share| times.quantile(share);
+    json!({"p50_ms": times.median(), "p95_ms": at(0.95), "p99_ms": at(0.99), "steps": times.len()})
 }

@@ -6,8 +6,9 @@ use std::path::Path;
 
 use anyhow::Result;
 use elements::{Law, Ogden};
+use gauge::median;
 
-use super::section::{Section, median, verdict};
+use super::section::{Section, verdict};
 use crate::fit::Wanted;
 use crate::fit::data::{self, Sample};
 use crate::fit::least_squares::best;

@@ -7,8 +7,9 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use elements::Ogden;
+use gauge::median;
 
-use super::section::{Section, median, verdict};
+use super::section::{Section, verdict};
 use crate::fit::Wanted;
 use crate::fit::curve::{Curve, Mode, nominal_stress};
 use crate::fit::data::Table;
@@ -121,18 +122,19 @@ pub fn section(path: &Path) -> Result<Section> {
                 .map(|(p, law)| errors(p, law, up_to));
             let (rms, most): (Vec<f64>, Vec<f64>) = found.map(|[a, b]| (a, b)).unzip();
             let worst = |list: &[f64]| list.iter().copied().fold(0.0, f64::max);
-            let reached = median(&rms) <= BAR[0] && worst(&rms) <= BAR[1];
+            let middle = median(&rms);
+            let reached = middle <= BAR[0] && worst(&rms) <= BAR[1];
             text += &format!(
                 "| {name} | {:.0} % | {:.1} % | {:.1} % | {:.1} % | {:.1} % | {} |\n",
                 100.0 * up_to,
-                100.0 * median(&rms),
+                100.0 * middle,
                 100.0 * worst(&rms),
                 100.0 * median(&most),
                 100.0 * worst(&most),
                 verdict(reached)
             );
-            if up_to == PREDICTED[0] && best_law.is_none_or(|(least, _)| median(&rms) < least) {
-                best_law = Some((median(&rms), at));
+            if up_to == PREDICTED[0] && best_law.is_none_or(|(least, _)| middle < least) {
+                best_law = Some((middle, at));
             }
         }
         all.push(laws);

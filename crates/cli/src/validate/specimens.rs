@@ -8,11 +8,12 @@ use std::path::Path;
 
 use anyhow::Result;
 use elements::{Law, Material, Ogden};
+use gauge::median;
 use tissue::mesh::regular_box;
 use tissue::statics::relax;
 
 use super::equilibrium::{ends, forces};
-use super::section::{Section, median, verdict};
+use super::section::{Section, verdict};
 use crate::fit::curve::{Curve, Mode, nominal_stress};
 use crate::fit::data::{self, Sample};
 use crate::fit::least_squares::{Exponents, best};

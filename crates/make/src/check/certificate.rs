@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use gauge::{Sorted, median};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tissue::mesh::Mesh;
@@ -77,7 +78,7 @@ impl Certificate {
                 .zip(&score.nodes)
                 .for_each(|(sum, e)| *sum += f64::from(*e));
         }
-        ratios.sort_by(f64::total_cmp);
+        let ratio = median(ratios);
         let seen: Vec<&Part> = by_region
             .iter()
             .filter(|part| part.steps >= ENOUGH_STEPS)
@@ -85,11 +86,8 @@ impl Certificate {
         let means: Vec<f64> = seen.iter().map(|part| part.mean(part.mse)).collect();
         let mean = means.iter().sum::<f64>() / means.len().max(1) as f64;
         let worst = means.iter().copied().fold(0.0, f64::max);
-        let at = |share: f64| {
-            times
-                .get(((times.len().max(1) - 1) as f64 * share) as usize)
-                .copied()
-        };
+        let ms = Sorted::of(times);
+        let known = |ms: f64| (!times.is_empty()).then(|| short(ms));
         let stated = &model.manifest;
         let unlearned = stated.reduced.is_none() && stated.upt.is_none();
         let value = json!({
@@ -112,8 +110,8 @@ impl Certificate {
             "regions": by_region.iter().map(part).collect::<Vec<Value>>(),
             "worst_region_over_mean": if means.is_empty() { Value::Null } else { short(worst / mean.max(f64::MIN_POSITIVE)) },
             "force_error": if force[1] > 0.0 { short((force[0] / force[1]).sqrt()) } else { Value::Null },
-            "truth_over_estimate": ratios.get(ratios.len() / 2).map_or(Value::Null, |ratio| short(*ratio)),
-            "speed": {"threads": 1, "ms_median": at(0.5).map(short), "ms_p99": at(0.99).map(short), "steps_in_contact": times.len()},
+            "truth_over_estimate": if ratio.is_nan() { Value::Null } else { short(ratio) },
+            "speed": {"threads": 1, "ms_median": known(ms.median()), "ms_p99": known(ms.quantile(0.99)), "steps_in_contact": times.len()},
             "machine": serde_json::to_value(Machine::this()).unwrap_or_default(),
             "envelope": {
                 "max_push_mm": stated.envelope.max_push_mm, "contact_area_mm2": stated.envelope.contact_area_mm2,

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
+use gauge::median;
 use serde_json::{Value, json};
 use tissue::programmes::ToolScale;
 use tissue::simulate::{ToolOrder, simulate_tools};
@@ -71,11 +72,8 @@ pub fn measure(plan: &Plan, bundle: &Bundle, scale: ToolScale, seconds: f64) -> 
             return None;
         }
         let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
-        let mut forces: Vec<f64> = own
-            .iter()
-            .flat_map(|case| case.force_error.clone())
-            .collect();
-        forces.sort_by(f64::total_cmp);
+        let forces = own.iter().flat_map(|case| case.force_error.clone());
+        let force = median(forces);
         let mean = own.iter().map(|case| case.mse_mm2).sum::<f64>() / own.len() as f64;
         Some(json!({
             "programme": programme.name(),
@@ -84,7 +82,7 @@ pub fn measure(plan: &Plan, bundle: &Bundle, scale: ToolScale, seconds: f64) -> 
             "mse_mm2": short(mean),
             "worst_mse_mm2": short(most(&mut own.iter().map(|case| case.mse_mm2))),
             "max_mm": short(most(&mut own.iter().map(|case| case.max_error_mm))),
-            "force_error": forces.get(forces.len() / 2).map(|error| short(*error)),
+            "force_error": (!force.is_nan()).then(|| short(force)),
             "inverted_steps": own.iter().map(|case| case.inverted_steps).sum::<usize>(),
             "deepest_in_a_tool_mm": short(most(&mut own.iter().map(|case| case.penetration_mm))),
         }))

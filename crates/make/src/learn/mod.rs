@@ -9,6 +9,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
+use gauge::median;
 use serde_json::json;
 use tissue::schemes::{FRAMES, SplitMix};
 use upt::Corrections;
@@ -268,9 +269,7 @@ fn median_ratio(without: &Certificate, with: &Certificate) -> f64 {
             .collect()
     };
     let pairs = errors(with).into_iter().zip(errors(without));
-    let mut ratios: Vec<f64> = pairs.map(|(with, without)| with / without).collect();
-    ratios.sort_by(f64::total_cmp);
-    ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN)
+    median(pairs.map(|(with, without)| with / without))
 }
 
 fn kept(kept: bool) -> &'static str {

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use gauge::median;
 use tissue::metrics;
 use tissue::programmes::{ToolCase, ToolProgramme};
 use tissue::schemes::FRAME_S;
@@ -118,9 +119,8 @@ pub fn table(text: &mut String, driven: &[Driven]) -> bool {
     text.push_str(&Table::of(&[0, 5], &COLUMNS, driven).markdown());
     // Medians: a slip-off to another place of the tissue is one case's, not growth.
     let middle = |half: &[Driven]| {
-        let mut values: Vec<f64> = half.iter().map(|one| mean(&one.mse)).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied().unwrap_or(0.0)
+        let middle = median(half.iter().map(|one| mean(&one.mse)));
+        if middle.is_nan() { 0.0 } else { middle }
     };
     let (first, later) = driven.split_at(driven.len() / 2);
     let (first, later) = (middle(first), middle(later));

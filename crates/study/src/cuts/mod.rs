@@ -16,9 +16,9 @@ use topology::Sweep;
 use upt::{Blade, Contact, Mode, Scene, Tool};
 
 use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
-use crate::quantile::{median, quantile};
 use crate::report::options::Options;
 use crate::table::Column;
+use gauge::{Sorted, median};
 use programmes::{BALL_MM, Frame, Operation, PROGRAMMES, Programme, Site};
 
 /// What the blades of the programmes feel, J/m².
@@ -240,11 +240,10 @@ fn ball_at(radius: f32, at: [f32; 3]) -> Result<Tool> {
 }
 
 impl Found {
-    fn row(mut self) -> Row {
+    fn row(self) -> Row {
         let all = |which: usize| self.errors.iter().map(move |error| error[which]);
         let [removed, wanted] = self.removed;
-        self.steps.ms.sort_by(f64::total_cmp);
-        let quick = [0.5, 0.99].map(|part| quantile(&self.steps.ms, part));
+        let ms = Sorted::of(self.steps.ms);
         Row {
             copies: median(self.copies.iter().copied()),
             mse: median(all(0)),
@@ -261,7 +260,7 @@ impl Found {
                 median(self.changes.iter().copied()),
                 largest(self.changes.iter().copied()),
             ],
-            step_ms: quick,
+            step_ms: [ms.median(), ms.quantile(0.99)],
             ..Row::default()
         }
     }

@@ -3,8 +3,8 @@
 use tissue::programmes::ToolProgramme;
 
 use super::limits::{Limits, Tried};
-use crate::quantile::quantile;
 use crate::table::{Table, or_dash};
+use gauge::{Sorted, median};
 use host::Effort;
 use upt_cli::counted::counted;
 use upt_cli::plot::label;
@@ -62,19 +62,15 @@ pub fn markdown(
         if own.is_empty() {
             return;
         }
-        let sorted = |mut values: Vec<f64>| {
-            values.sort_by(f64::total_cmp);
-            values
-        };
-        let mse = sorted(own.iter().map(|case| case.mse_mm2).collect());
-        let force = sorted(own.iter().filter_map(|case| case.force_error).collect());
-        let force = (!force.is_empty()).then(|| 100.0 * quantile(&force, 0.5));
+        let mse = Sorted::of(own.iter().map(|case| case.mse_mm2));
+        let force = median(own.iter().filter_map(|case| case.force_error));
+        let force = (!force.is_nan()).then_some(100.0 * force);
         let good = own.iter().filter(|case| case.good).count();
         table.push([
             name.into(),
             own.len().to_string(),
-            label(quantile(&mse, 0.5)),
-            label(mse[mse.len() - 1]),
+            label(mse.median()),
+            label(mse.largest()),
             or_dash(force, |force| format!("{force:.1} %")),
             good.to_string(),
         ]);

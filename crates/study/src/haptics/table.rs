@@ -6,8 +6,8 @@ use contact::Vector;
 
 use super::play::Track;
 use super::truth::{FRAME_S, Forces, resample};
-use crate::report::memory::Resident;
 use crate::table::{Column, Table};
+use gauge::Resident;
 use upt_cli::plot::{Axes, Scale, colour};
 
 /// Samples of a mean, ms.

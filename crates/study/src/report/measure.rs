@@ -6,10 +6,9 @@ use anyhow::Result;
 use tissue::mesh::Mesh;
 
 use super::cases::Cases;
-use super::memory::Resident;
 use super::method::{Method, Stepper};
 use super::row::{Measurement, PRIOR_ALONE, Pictured, Row, mean_and_deviation};
-use crate::quantile::quantile;
+use gauge::{Resident, Sorted};
 use yardstick::errors::{CaseErrors, StepErrors, step_errors};
 
 /// What a measurement is asked to do.
@@ -206,12 +205,11 @@ fn fill_errors(row: &mut Row, cases: &[CaseErrors]) {
 }
 
 fn fill_times(row: &mut Row, latencies: &[f64]) {
-    let mut sorted = latencies.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    row.ms_p50 = quantile(&sorted, 0.5);
-    row.ms_p95 = quantile(&sorted, 0.95);
-    row.ms_p99 = quantile(&sorted, 0.99);
-    row.ms_max = quantile(&sorted, 1.0);
+    let sorted = Sorted::of(latencies);
+    row.ms_p50 = sorted.median();
+    row.ms_p95 = sorted.quantile(0.95);
+    row.ms_p99 = sorted.quantile(0.99);
+    row.ms_max = sorted.largest();
 }
 
 /// Smallest, mean and largest MSE over the cases at each step.

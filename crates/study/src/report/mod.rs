@@ -10,7 +10,6 @@ mod film;
 mod float32;
 pub mod html;
 mod measure;
-pub mod memory;
 pub mod method;
 pub mod options;
 mod paper_split;

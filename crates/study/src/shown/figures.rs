@@ -1,9 +1,9 @@
 //! Rows of what was shown: a way of drawing frames over the cases of a programme, or over all.
 
+use gauge::median;
 use serde::Serialize;
 
 use super::host::{LATE, PRESENT, Shown, WAYS};
-use crate::quantile::median;
 use yardstick::cases::ToolCase;
 
 /// Programme of the row over all.

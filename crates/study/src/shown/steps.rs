@@ -4,6 +4,7 @@
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
+use gauge::median;
 use serde::Serialize;
 use serde_json::json;
 use tissue::mesh::{Boundary, Mesh};
@@ -11,7 +12,6 @@ use tissue::metrics;
 use tissue::schemes::FRAME_S;
 
 use super::truth::{Truth, places};
-use crate::quantile::median;
 use crate::report::options::Options;
 use crate::table::{Column, Table};
 use crate::tools::bundles::fitting;

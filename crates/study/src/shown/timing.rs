@@ -7,7 +7,7 @@ use tissue::schemes::FRAME_S;
 
 use super::host::Clock;
 use super::truth::Truth;
-use crate::quantile::quantile;
+use gauge::Sorted;
 use yardstick::cases::ToolCases;
 use yardstick::drive::Driver;
 
@@ -76,13 +76,14 @@ pub fn measure(
                 }
             }
         }
-        spent.sort_by(f64::total_cmp);
+        let calls = spent.len();
+        let spent = Sorted::of(spent);
         times.push(Time {
             region,
             nodes: count,
-            calls: spent.len(),
-            median_ms: quantile(&spent, 0.5),
-            p99_ms: quantile(&spent, 0.99),
+            calls,
+            median_ms: spent.median(),
+            p99_ms: spent.quantile(0.99),
         });
     }
     driver.set_region(&[])?;

@@ -1,10 +1,9 @@
 //! Rows of the yardstick: a bundle, a way of driving it, corrections and a programme.
 
+use gauge::median;
 use host::Effort;
 use serde::Serialize;
 use yardstick::CaseFigures;
-
-use crate::quantile::median;
 
 /// Programme of the row over all programmes without a grasp.
 pub const ALL: &str = "all but grasp";

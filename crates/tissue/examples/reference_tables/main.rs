@@ -127,10 +127,7 @@ fn laws(mesh: &Mesh) -> Outcome<String> {
                 times.push(1e3 * start.elapsed().as_secs_f64());
             }
         }
-        let medians = times.map(|mut times| {
-            times.sort_by(f64::total_cmp);
-            times[ROUNDS / 2]
-        });
+        let medians = times.map(gauge::median);
         for (law, median) in all.iter().zip(medians) {
             table += &format!(
                 "| {law:.3} | {isa:?} | {median:.3} | {:.2} |\n",

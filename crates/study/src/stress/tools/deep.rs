@@ -10,8 +10,8 @@ use tissue::solver::Tool;
 use super::hand::{any, at, between, sites};
 use super::run::Hands;
 use crate::bench::Bench;
-use crate::processor_time::ProcessorTime;
 use crate::stress::Row;
+use gauge::{ProcessorTime, Sorted};
 
 const STEPS: usize = 1000;
 /// Steps at new poses with the same tools.
@@ -69,17 +69,13 @@ fn row(hands: &mut Hands, name: &str) -> Result<Row> {
             }
         }
     }
-    let at = |times: &mut [f64], share: f64| {
-        times.sort_by(f64::total_cmp);
-        let place = (share * (times.len() as f64 - 1.0)) as usize;
-        times.get(place).copied().unwrap_or(0.0)
-    };
+    let times = Sorted::of(times);
     let text = format!(
         "{steps} steps, {refused} refused by the guard; processor time of a step: {:.1} ms in the median, {:.1} ms at p99, {:.1} ms at most; wall: {:.1} ms at most; contact: {contact:.1} ms at most",
-        at(&mut times, 0.5),
-        at(&mut times, 0.99),
-        at(&mut times, 1.0),
-        at(&mut walls, 1.0),
+        times.median(),
+        times.quantile(0.99),
+        times.largest(),
+        Sorted::of(walls).largest(),
     );
     let finite = hands.field.as_flattened().iter().all(|u| u.is_finite());
     Ok(Row::new(&hands.bench.subject, name, text, finite))

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use contact::{Body, Shape, Vector};
+use gauge::Sorted;
 use tissue::solver::Tool;
 use upt::flag;
 
@@ -55,21 +56,21 @@ fn row(hands: &mut Hands, places: &[Site], leap: f32) -> Result<Row> {
         silent += usize::from(quick.silent > 0);
         apart.push(off);
     }
-    apart.sort_by(f64::total_cmp);
     let name = format!("a blade of 3 mm that presses {PRESS_MM} mm and leaps {leap} mm on");
     let subject = &hands.bench.subject;
-    let (Some(median), Some(worst)) = (apart.get(apart.len() / 2), apart.last()) else {
+    if apart.is_empty() {
         return Ok(Row::left(
             subject,
             &name,
             "the slow press slides off in all places",
         ));
-    };
+    }
+    let apart = Sorted::of(apart);
     let text = format!(
         "force of the slow press within {:.0} % in {good} of {compared} places ({:.1} % in the median, {:.0} at most); no contact and no flag in {silent}",
         100.0 * APART,
-        100.0 * median,
-        100.0 * worst
+        100.0 * apart.median(),
+        100.0 * apart.largest()
     );
     let is_good = silent == 0 && 10 * good >= 9 * compared;
     Ok(Row::new(subject, &name, text, is_good))

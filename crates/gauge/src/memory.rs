@@ -54,7 +54,7 @@ mod tests {
     #[test]
     fn written_pages_are_counted_and_freed_ones_are_not() {
         if std::env::var_os(ALONE).is_none() {
-            let name = "report::memory::tests::written_pages_are_counted_and_freed_ones_are_not";
+            let name = "memory::tests::written_pages_are_counted_and_freed_ones_are_not";
             let program = std::env::current_exe().unwrap();
             let run = std::process::Command::new(program)
                 .args(["--exact", name, "--test-threads=1"])
