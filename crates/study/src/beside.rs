@@ -15,7 +15,6 @@ use upt::{Corrections, Error, Model, ModelOptions, Scene, SceneOptions, StepInpu
 use crate::report::options::Options;
 use crate::table::{Column, Table};
 use host::Effort;
-use upt_cli::marks::replace_between;
 use yardstick::bundle_folder::BundleFolder;
 
 /// A bundle, its mesh, and the corrections that are asked for.
@@ -102,14 +101,9 @@ pub fn report<R: Serialize>(
         };
         rows.extend(measure(subject)?);
     }
-    let table = Table::of(words, columns, &rows).markdown();
-    match asked.json {
-        true => println!("{}", serde_json::to_string_pretty(&rows)?),
-        false => print!("{table}"),
-    }
-    for page in &asked.markdown {
-        replace_between(page, mark, &format!("\n{table}"))?;
-    }
+    let publisher = asked.publisher();
+    publisher.part(mark, &Table::of(words, columns, &rows).markdown())?;
+    publisher.end(&rows, &[])?;
     Ok(ExitCode::SUCCESS)
 }
 

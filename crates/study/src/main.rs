@@ -14,6 +14,8 @@ mod hang_report;
 mod haptics;
 mod load_report;
 mod mobilise_report;
+mod posed;
+mod publish;
 mod report;
 mod shown;
 mod soak;

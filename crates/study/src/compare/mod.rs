@@ -20,10 +20,10 @@ use tissue::schemes::{Programme, Scheme};
 use upt::Corrections;
 
 use crate::bench::{Bench, push, ramp};
+use crate::publish::Publisher;
 use observer::Moment;
 use pair::Pair;
 use release::{CASE, HELD, Release};
-use upt_cli::marks::replace_between;
 use upt_cli::progress;
 
 #[derive(clap::Args)]
@@ -118,20 +118,16 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         tables::ranks(&mut text, &inside, &outside);
         tables::points(&mut text, &inside);
     }
-    print!("{text}{of_tools}");
-    if let Some(page) = &options.markdown {
-        for (what, text) in [
-            ("study compare", &text),
-            ("study compare --tools", &of_tools),
-        ] {
-            if !text.is_empty() {
-                let name = format!("{what} {}", bench.subject);
-                replace_between(page, &name, &format!("\n{text}"))?;
-            }
-        }
+    let publisher = Publisher {
+        json: false,
+        pages: options.markdown.as_slice(),
+    };
+    let parts = [("study compare", text), ("study compare --tools", of_tools)];
+    for (what, text) in parts.iter().filter(|(_, text)| !text.is_empty()) {
+        publisher.part(&format!("{what} {}", bench.subject), text)?;
     }
     for complaint in &complaints {
-        println!("{complaint}");
+        publisher.say(complaint);
     }
     Ok(ExitCode::from(u8::from(!complaints.is_empty())))
 }

@@ -11,15 +11,14 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
-use tissue::mesh::{Boundary, Mesh};
 
-use crate::tools::bundles;
+use crate::posed::Posed;
+use crate::publish::Publisher;
 use host::Effort;
 use limits::{Limits, Tried};
 use upt_cli::one_of::one_of;
 use upt_cli::progress;
-use yardstick::bundle_folder::BundleFolder;
-use yardstick::cases::{Split, ToolCases};
+use yardstick::cases::Split;
 use yardstick::manifest::Manifest;
 
 /// Options of `upt-study envelope`.
@@ -65,14 +64,10 @@ pub struct Options {
 /// Runs the command.
 pub fn run(options: &Options) -> Result<ExitCode> {
     check(options)?;
-    let cases = ToolCases::read(&options.tools, options.split, options.cases)?;
+    let named = std::slice::from_ref(&options.bundle);
+    let posed = Posed::read(&options.tools, options.split, options.cases, named)?;
+    let (cases, mesh, bundle) = (&posed.cases, &posed.mesh, &posed.bundles[0]);
     cases.check_steps()?;
-    let mut fitting = bundles::fitting(
-        std::slice::from_ref(&options.bundle),
-        &cases,
-        &mut Vec::new(),
-    )?;
-    let bundle: BundleFolder = fitting.remove(0);
     let corrections = match (options.corrections, bundle.corrections) {
         (_, None) => bail!(
             "{}: has no corrections, which the limits of tools need; add them with `upt corrections`",
@@ -80,18 +75,15 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         ),
         (Some(effort), _) | (None, Some(effort)) => effort,
     };
-    let mesh = Mesh::read(&bundle.mesh_file)?;
-    cases.check(&mesh)?;
     let figures = yardstick::solved(
-        &bundle,
+        bundle,
         corrections,
-        &cases,
-        &mesh,
+        cases,
+        mesh,
         options.threads,
         &progress::watch(false),
     )?;
-    let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
-    let samples = mesh.samples(boundary);
+    let samples = mesh.samples(posed.boundary);
     let good = |mse: f64, inverted: usize| mse <= options.limit_mm2 && inverted == 0;
     let tried: Vec<Tried> = cases
         .list
@@ -125,19 +117,16 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         &tried,
         &limits,
     );
-    for page in &options.markdown {
-        let name = format!("study envelope {}", bundle.name);
-        upt_cli::marks::replace_between(page, &name, &format!("\n{text}"))?;
+    let publisher = Publisher {
+        json: options.json,
+        pages: &options.markdown,
+    };
+    publisher.part(&format!("study envelope {}", bundle.name), &text)?;
+    if options.dry_run {
+        publisher.say("nothing was written (--dry-run)");
     }
-    if options.json {
-        let report = json!({"bundle": bundle.name, "tools": entry, "limit_mm2": options.limit_mm2, "cases": tried});
-        println!("{}", serde_json::to_string_pretty(&report)?);
-    } else {
-        print!("{text}");
-        if options.dry_run {
-            println!("nothing was written (--dry-run)");
-        }
-    }
+    let report = json!({"bundle": bundle.name, "tools": entry, "limit_mm2": options.limit_mm2, "cases": tried});
+    publisher.end(&report, &[])?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -15,7 +15,7 @@ mod play;
 mod table;
 mod truth;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,10 +25,10 @@ use anyhow::{Context, Result, bail};
 use tissue::mesh::{Boundary, Mesh};
 use upt::{Corrections, Model, ModelOptions, SceneOptions};
 
+use crate::publish::Publisher;
 use gesture::{GESTURES, Site};
 use play::Player;
 use table::{Account, Row};
-use upt_cli::marks::replace_between;
 use upt_cli::progress;
 use yardstick::bundle_folder::BundleFolder;
 use yardstick::machine::{Machine, load_words};
@@ -152,16 +152,12 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     drop(load);
     bar.finish_and_clear();
     let text = table::markdown(&rows, &account, options.reference > 0.0);
-    println!("{text}");
-    if let Some(page) = &options.markdown {
-        write(
-            page,
-            &bundle.name,
-            (mesh.node_count(), step_ms),
-            options,
-            &text,
-        )?;
-    }
+    let publisher = Publisher {
+        json: false,
+        pages: options.markdown.as_slice(),
+    };
+    let (mark, lead) = heading(options, &bundle.name, (mesh.node_count(), step_ms));
+    publisher.part(&mark, &format!("{lead}{text}"))?;
     Ok(ExitCode::from(u8::from(account.is_bad())))
 }
 
@@ -189,16 +185,11 @@ impl Drop for Load {
     }
 }
 
-fn write(
-    page: &Path,
-    name: &str,
-    (nodes, step_ms): (usize, f64),
-    options: &Options,
-    text: &str,
-) -> Result<()> {
+/// The name of the table's marks, and the sentence above it.
+fn heading(options: &Options, name: &str, (nodes, step_ms): (usize, f64)) -> (String, String) {
     let machine = Machine::this();
     let lead = format!(
-        "\n`{name}`, {nodes} nodes, steps of {step_ms:.0} ms that arrive {} ms late; {} ({} cores{}), --load {}.\n\n",
+        "`{name}`, {nodes} nodes, steps of {step_ms:.0} ms that arrive {} ms late; {} ({} cores{}), --load {}.\n\n",
         options.latency_ms,
         machine.cpu,
         machine.cores,
@@ -209,9 +200,5 @@ fn write(
         Some(ms) => format!(" --step-ms {ms}"),
         None => String::new(),
     };
-    replace_between(
-        page,
-        &format!("study haptics {name}{own}"),
-        &format!("{lead}{text}"),
-    )
+    (format!("study haptics {name}{own}"), lead)
 }

@@ -91,16 +91,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         viewer: film::viewer(&cases, &mesh, &methods)?,
     };
     let report = findings.write(options)?;
-    if options.json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
-    } else {
-        let rows: Vec<&row::Row> = measurements.iter().map(|one| &one.row).collect();
-        print!("{}", table::text(&rows));
-        for note in &notes {
-            println!("left out: {note}");
-        }
-        println!("{}", options.out.join("report.html").display());
-    }
+    let rows: Vec<&row::Row> = measurements.iter().map(|one| &one.row).collect();
+    let publisher = options.publisher();
+    publisher.say(&table::text(&rows));
+    publisher.end(&report, &notes)?;
+    publisher.say(&options.out.join("report.html").to_string_lossy());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -7,6 +7,7 @@ use tissue::hang::HangSizes;
 use tissue::load_programmes::LoadProgramme;
 use tissue::programmes::ToolProgramme;
 
+use crate::publish::Publisher;
 use host::Effort;
 use upt_cli::one_of::one_of;
 use upt_cli::simulate::LoadArguments;
@@ -146,6 +147,14 @@ impl Options {
     /// Where one number of threads is measured.
     pub fn most_threads(&self) -> u32 {
         self.threads.iter().copied().max().unwrap_or(1)
+    }
+
+    /// Where the report goes.
+    pub fn publisher(&self) -> Publisher<'_> {
+        Publisher {
+            json: self.json,
+            pages: &self.markdown,
+        }
     }
 
     pub fn bed_sizes(&self) -> HangSizes {

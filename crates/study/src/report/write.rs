@@ -1,6 +1,6 @@
 //! The report's files: report.json, report.html, and report.md for a document.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use serde_json::json;
 use tissue::mesh::Mesh;
 use tissue::trajectory::TrajectoryHeader;
@@ -9,6 +9,7 @@ use super::cases::Cases;
 use super::row::{Measurement, Row};
 use super::{Options, html, pictures, table};
 use crate::date::date;
+use crate::publish;
 use yardstick::machine::Machine;
 
 /// What was measured on which cases: all that a report says.
@@ -44,14 +45,9 @@ impl Made {
 impl Findings<'_> {
     /// Writes report.json, report.md and report.html; returns the first.
     pub fn write(self, options: &Options) -> Result<serde_json::Value> {
-        std::fs::create_dir_all(&options.out)
-            .with_context(|| format!("cannot make {}", options.out.display()))?;
         let made = Made::now();
         let report = self.json(&made);
-        std::fs::write(
-            options.out.join("report.json"),
-            serde_json::to_string_pretty(&report)? + "\n",
-        )?;
+        publish::file(&options.out.join("report.json"), &report)?;
         std::fs::write(options.out.join("report.md"), self.document(&made))?;
         let title = options.title.as_deref();
         let page = self.page(&made, title.unwrap_or("Error against run time"))?;

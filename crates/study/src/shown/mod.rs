@@ -22,41 +22,32 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use serde_json::json;
-use tissue::mesh::{Boundary, Mesh};
 
+use crate::posed::Posed;
+use crate::publish;
 use crate::report::options::Options;
-use crate::tools::bundles::fitting;
 use ::host::Effort;
 use ::host::{Model, ModelSettings};
 use figures::CaseFigures;
 use host::{Clock, Shown};
 use truth::Truth;
 use upt_cli::counted::counted;
-use upt_cli::marks::replace_between;
-use upt_cli::progress;
-use yardstick::cases::ToolCases;
 use yardstick::drive::{Drive, Driver};
-use yardstick::machine::{Machine, load_words};
 use yardstick::yard::Yard;
 
 /// Measures, and writes shown.json and the pictures.
 pub fn report(options: &Options, hz: f64) -> Result<ExitCode> {
     let corrections = options.corrections.first().copied();
     let clock = Clock::new(hz, options.arrival_ms)?;
-    let cases = ToolCases::read(&options.tools, options.split, options.cases)?;
-    let mut notes = Vec::new();
-    let bundles = fitting(&options.bundles, &cases, &mut notes)?;
-    let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
-    let mesh = Mesh::read(&bundles[0].mesh_file)?;
-    cases.check(&mesh)?;
-    let truths: Vec<Truth> = cases.list.iter().map(Truth::of).collect::<Result<_>>()?;
-    let mut yard = Yard::new(&mesh, boundary);
+    let mut posed = Posed::asked(options)?;
+    let Posed { cases, mesh, .. } = &posed;
+    let truths = Truth::of_all(cases)?;
+    let mut yard = Yard::new(mesh, posed.boundary);
     std::fs::create_dir_all(&options.out)
         .with_context(|| format!("cannot make {}", options.out.display()))?;
-    let header = &cases.list[0].trajectory.header;
-    let (machine, date) = (Machine::this(), crate::date::date());
-    let mut reports = Vec::new();
-    for bundle in &bundles {
+    let publisher = options.publisher();
+    let (mut reports, mut notes) = (Vec::new(), Vec::new());
+    for bundle in &posed.bundles {
         if bundle.corrections.is_none() {
             notes.push(format!(
                 "{}: has no corrections, so it cannot present frames; add them with `upt corrections`",
@@ -71,16 +62,13 @@ pub fn report(options: &Options, hz: f64) -> Result<ExitCode> {
         };
         let model = Model::open(&bundle.path, &settings)?;
         let mut driver = Driver::new(&model, Drive::Solved)?;
-        let bar = progress::cases(cases.list.len(), &bundle.name);
         let (mut outcomes, mut figures): (Vec<Shown>, Vec<CaseFigures>) = Default::default();
-        for (case, truth) in cases.list.iter().zip(&truths) {
-            let shown = host::show(case, truth, &clock, &mut driver, &mut yard)
-                .with_context(|| case.name.clone())?;
+        posed.each(&bundle.name, |at, case| {
+            let shown = host::show(case, &truths[at], &clock, &mut driver, &mut yard)?;
             figures.push(CaseFigures::of(case, &shown));
             outcomes.push(shown);
-            bar.inc(1);
-        }
-        bar.finish_and_clear();
+            Ok(())
+        })?;
         let mut lengths = vec![(
             model.info().frame_step_s,
             format!(
@@ -103,17 +91,14 @@ pub fn report(options: &Options, hz: f64) -> Result<ExitCode> {
             let model = Model::open(&bundle.path, &settings)?;
             let mut driver = Driver::new(&model, Drive::Solved)?;
             let clock = clock.stepping(*step_s);
-            let bar = progress::cases(cases.list.len(), &format!("{}, {length}", bundle.name));
-            for ((case, truth), figures) in cases.list.iter().zip(&truths).zip(&mut figures) {
-                let shown = host::show(case, truth, &clock, &mut driver, &mut yard)
-                    .with_context(|| case.name.clone())?;
-                figures.add(case, &shown, length);
+            posed.each(&format!("{}, {length}", bundle.name), |at, case| {
+                let shown = host::show(case, &truths[at], &clock, &mut driver, &mut yard)?;
+                figures[at].add(case, &shown, length);
                 if between.len() < cases.list.len() {
                     between.push(shown);
                 }
-                bar.inc(1);
-            }
-            bar.finish_and_clear();
+                Ok(())
+            })?;
         }
         let settings = ModelSettings {
             step_s: model.info().frame_step_s,
@@ -121,8 +106,8 @@ pub fn report(options: &Options, hz: f64) -> Result<ExitCode> {
         };
         let times = timing::measure(
             &mut Driver::new(&Model::open(&bundle.path, &settings)?, Drive::Solved)?,
-            &mesh,
-            &cases,
+            mesh,
+            cases,
             &truths,
             &clock.stepping(settings.step_s),
         )?;
@@ -130,61 +115,36 @@ pub fn report(options: &Options, hz: f64) -> Result<ExitCode> {
         let datasets = figures::by_dataset(&figures, host::WAYS.len());
         let k = corrections.or(bundle.corrections).unwrap_or(Effort::NONE);
         let lead = format!(
-            "`{}`, k = {k}, {} on {} ({} nodes), frames at {} Hz, each state {} ms after its step's moment, {}. {} ({}{}), {date}.",
+            "`{}`, k = {k}, {}, frames at {} Hz, each state {} ms after its step's moment, {}. {}.",
             bundle.name,
-            counted(cases.list.len(), "case"),
-            header.mesh_name,
-            mesh.node_count(),
+            posed.said(),
             hz,
             options.arrival_ms,
             counted(options.most_threads() as usize, "thread"),
-            machine.cpu,
-            counted(machine.cores, "core"),
-            load_words(),
+            posed.place(),
         );
         let text = page::markdown(&lead, &rows, &datasets, &times);
-        for path in &options.markdown {
-            replace_between(
-                path,
-                &format!("study report --shown {}", bundle.name),
-                &text,
-            )?;
-        }
-        if !options.json {
-            println!("{text}");
-        }
+        publisher.part(&format!("study report --shown {}", bundle.name), &text)?;
         let pictures = page::pictures(
             &options.out,
             &bundle.name,
-            (&mesh, &cases, &truths),
+            (mesh, cases, &truths),
             [&outcomes, &between],
         )?;
-        for path in pictures.iter().filter(|_| !options.json) {
-            println!("{}", path.display());
+        for path in pictures {
+            publisher.say(&path.to_string_lossy());
         }
         reports.push(json!({"bundle": bundle.name, "corrections": k.to_string(), "rows": rows, "datasets": datasets, "present": times, "cases": figures}));
     }
+    posed.notes.extend(notes);
     if reports.is_empty() {
-        bail!("nothing could be measured: {}", notes.join("; "));
+        bail!("nothing could be measured: {}", posed.notes.join("; "));
     }
-    let report = json!({
-        "machine": machine,
-        "date": date,
-        "hz": hz,
-        "arrival_ms": options.arrival_ms,
-        "threads": options.most_threads(),
-        "versions": {"upt": env!("CARGO_PKG_VERSION"), "solver": header.solver},
-        "mesh": {"name": header.mesh_name, "sha256": cases.mesh_sha256, "nodes": mesh.node_count(), "boundary": cases.boundary},
-        "bundles": reports,
-        "left_out": notes,
-    });
-    let text = serde_json::to_string_pretty(&report)? + "\n";
-    std::fs::write(options.out.join("shown.json"), &text)?;
-    if options.json {
-        print!("{text}");
-    }
-    for note in notes.iter().filter(|_| !options.json) {
-        println!("left out: {note}");
-    }
+    let mut report = posed.origin(options.most_threads());
+    report["hz"] = json!(hz);
+    report["arrival_ms"] = json!(options.arrival_ms);
+    report["bundles"] = json!(reports);
+    publish::file(&options.out.join("shown.json"), &report)?;
+    publisher.end(&report, &posed.notes)?;
     Ok(ExitCode::SUCCESS)
 }

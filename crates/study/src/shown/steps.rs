@@ -3,27 +3,23 @@
 
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use gauge::median;
 use serde::Serialize;
 use serde_json::json;
-use tissue::mesh::{Boundary, Mesh};
 use tissue::metrics;
 use tissue::schemes::FRAME_S;
 
 use super::truth::{Truth, places};
+use crate::posed::Posed;
 use crate::report::options::Options;
 use crate::table::{Column, Table};
-use crate::tools::bundles::fitting;
 use host::Effort;
 use host::{Model, ModelSettings};
 use upt_cli::counted::counted;
-use upt_cli::marks::replace_between;
 use upt_cli::plot::label;
-use upt_cli::progress;
-use yardstick::cases::{ToolCase, ToolCases};
+use yardstick::cases::ToolCase;
 use yardstick::drive::{Drive, Driver};
-use yardstick::machine::Machine;
 use yardstick::yard::Yard;
 
 /// The truth's forces are taken as their mean over this time about a moment, s: impulses of contact are noisy.
@@ -73,18 +69,13 @@ impl Sums {
 
 /// Measures, and writes the table.
 pub fn report(options: &Options) -> Result<ExitCode> {
-    let cases = ToolCases::read(&options.tools, options.split, options.cases)?;
-    let mut notes = Vec::new();
-    let bundles = fitting(&options.bundles, &cases, &mut notes)?;
-    let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
-    let mesh = Mesh::read(&bundles[0].mesh_file)?;
-    cases.check(&mesh)?;
-    let truths: Vec<Truth> = cases.list.iter().map(Truth::of).collect::<Result<_>>()?;
-    let mut yard = Yard::new(&mesh, boundary);
-    let header = &cases.list[0].trajectory.header;
-    let (machine, date) = (Machine::this(), crate::date::date());
+    let mut posed = Posed::asked(options)?;
+    let truths = Truth::of_all(&posed.cases)?;
+    let mut yard = Yard::new(&posed.mesh, posed.boundary);
+    let publisher = options.publisher();
     let mut all = Vec::new();
-    for bundle in &bundles {
+    let mut notes = Vec::new();
+    for bundle in &posed.bundles {
         let Some(recommended) = bundle.corrections else {
             let name = &bundle.name;
             notes.push(format!("{name}: has no corrections, so it has only one length of step; add them with `upt corrections`"));
@@ -105,51 +96,33 @@ pub fn report(options: &Options) -> Result<ExitCode> {
                 };
                 let model = Model::open(&bundle.path, &settings)?;
                 let mut driver = Driver::new(&model, Drive::Solved)?;
-                let bar =
-                    progress::cases(cases.list.len(), &format!("{}, {step_ms} ms", bundle.name));
                 let mut sums = Vec::new();
-                for (case, truth) in cases.list.iter().zip(&truths) {
-                    let own = replay(case, truth, 1e-3 * step_ms, &mut driver, &mut yard);
-                    sums.push(own.with_context(|| case.name.clone())?);
-                    bar.inc(1);
-                }
-                bar.finish_and_clear();
+                posed.each(&format!("{}, {step_ms} ms", bundle.name), |at, case| {
+                    let step_s = 1e-3 * step_ms;
+                    sums.push(replay(case, &truths[at], step_s, &mut driver, &mut yard)?);
+                    Ok(())
+                })?;
                 rows.push(row(&bundle.name, count, step_ms, &sums));
             }
         }
         let text = format!(
-            "\n`{}`, {} of rigid tools on {} ({} nodes), {}. {} ({}), {date}.\n\n{}\n",
+            "`{}`, {}, {}. {}.\n\n{}\n",
             bundle.name,
-            counted(cases.list.len(), "case"),
-            header.mesh_name,
-            mesh.node_count(),
+            posed.said(),
             counted(options.most_threads() as usize, "thread"),
-            machine.cpu,
-            counted(machine.cores, "core"),
+            posed.place(),
             Table::of(&[], &COLUMNS, &rows).markdown()
         );
-        for path in &options.markdown {
-            replace_between(
-                path,
-                &format!("study report --step-ms {}", bundle.name),
-                &text,
-            )?;
-        }
-        if !options.json {
-            println!("{text}");
-        }
+        publisher.part(&format!("study report --step-ms {}", bundle.name), &text)?;
         all.extend(rows);
     }
+    posed.notes.extend(notes);
     if all.is_empty() {
-        bail!("nothing could be measured: {}", notes.join("; "));
+        bail!("nothing could be measured: {}", posed.notes.join("; "));
     }
-    if options.json {
-        let report = json!({"machine": machine, "date": date, "rows": all, "left_out": notes});
-        println!("{}", serde_json::to_string_pretty(&report)?);
-    }
-    for note in notes.iter().filter(|_| !options.json) {
-        println!("left out: {note}");
-    }
+    let mut report = posed.origin(options.most_threads());
+    report["rows"] = json!(all);
+    publisher.end(&report, &posed.notes)?;
     Ok(ExitCode::SUCCESS)
 }
 

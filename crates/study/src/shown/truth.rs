@@ -5,7 +5,7 @@ use contact::{Pose, pose};
 use tissue::schemes::FRAME_S;
 use tissue::solver::ToolPose;
 
-use yardstick::cases::ToolCase;
+use yardstick::cases::{ToolCase, ToolCases};
 use yardstick::measure::{SLIP_MM, SLIP_WINDOW};
 use yardstick::yard::jump;
 
@@ -20,6 +20,12 @@ pub struct Truth {
 }
 
 impl Truth {
+    /// # Errors
+    /// Those of a case.
+    pub fn of_all(cases: &ToolCases) -> Result<Vec<Self>> {
+        cases.list.iter().map(Self::of).collect()
+    }
+
     /// # Errors
     /// Frames that are as long as a step, or no whole part of one.
     pub fn of(case: &ToolCase) -> Result<Self> {

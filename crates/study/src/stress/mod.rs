@@ -15,6 +15,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 
+use crate::publish::{self, Publisher};
 use crate::table::{Column, Table};
 pub use row::{Row, Verdict};
 use upt_cli::counted::counted;
@@ -62,13 +63,14 @@ pub fn run(options: &Options) -> Result<ExitCode> {
     // What happened is long: it comes last.
     let [subject, case, happened, verdict] = COLUMNS;
     let columns = [subject, case, verdict, happened];
-    print!("{}", Table::of(&[0, 1, 2, 3], &columns, &rows).text());
+    let publisher = Publisher {
+        json: false,
+        pages: options.markdown.as_slice(),
+    };
+    publisher.say(&Table::of(&[0, 1, 2, 3], &columns, &rows).text());
+    publisher.into_pages("study stress", &markdown(&rows))?;
     if let Some(path) = &options.json {
-        std::fs::write(path, serde_json::to_string_pretty(&rows)?)
-            .with_context(|| format!("{}", path.display()))?;
-    }
-    if let Some(path) = &options.markdown {
-        write_page(path, &rows)?;
+        publish::file(path, &rows)?;
     }
     let bad = rows.iter().filter(|r| r.verdict == Verdict::Bad).count();
     let left = rows.iter().filter(|r| r.verdict == Verdict::Left).count();
@@ -95,10 +97,10 @@ const COLUMNS: [Column<Row>; 4] = [
     ("verdict", |row| word(row.verdict).into()),
 ];
 
-fn write_page(path: &std::path::Path, rows: &[Row]) -> Result<()> {
+fn markdown(rows: &[Row]) -> String {
     let of_one = rows.chunk_by(|a, b| a.subject == b.subject).map(|own| {
         let table = Table::of(&[0, 1, 2], &COLUMNS[1..], own).markdown();
-        format!("\n### {}\n\n{table}", own[0].subject)
+        format!("### {}\n\n{table}", own[0].subject)
     });
-    upt_cli::marks::replace_between(path, "study stress", &of_one.collect::<String>())
+    of_one.collect::<Vec<_>>().join("\n")
 }

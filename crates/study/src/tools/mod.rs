@@ -3,11 +3,9 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`bundles`] | the bundles that fit the cases |
 //! | [`row`] | the rows over cases |
 //! | [`film`], [`section`], [`force`], [`table`], [`page`], `write` | what is shown |
 
-pub mod bundles;
 mod film;
 mod force;
 mod measured;
@@ -21,8 +19,8 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 use serde_json::json;
-use tissue::mesh::{Boundary, Mesh};
 
+use crate::posed::Posed;
 use crate::report::options::Options;
 use host::Effort;
 use measured::Measured;
@@ -30,7 +28,6 @@ use row::Label;
 use upt_cli::progress;
 use write::{Made, write};
 use yardstick::bundle_folder::BundleFolder;
-use yardstick::cases::ToolCases;
 use yardstick::drive::Drive;
 use yardstick::measure::Truth;
 use yardstick::prior_alone::PriorAlone;
@@ -39,18 +36,14 @@ use yardstick::{CaseFigures, Method};
 
 /// Measures, and writes tools.json and tools.html.
 pub fn report(options: &Options) -> Result<ExitCode> {
-    let cases = ToolCases::read(&options.tools, options.split, options.cases)?;
-    let mut notes = Vec::new();
+    let mut posed = Posed::asked(options)?;
+    let Posed { cases, mesh, .. } = &posed;
     cases.check_steps()?;
-    let bundles = bundles::fitting(&options.bundles, &cases, &mut notes)?;
-    let boundary: Boundary = cases.boundary.parse().map_err(anyhow::Error::msg)?;
-    let mesh = Mesh::read(&bundles[0].mesh_file)?;
-    cases.check(&mesh)?;
-    let mut yard = Yard::new(&mesh, boundary);
+    let mut yard = Yard::new(mesh, posed.boundary);
     let truths: Vec<Truth> = cases
         .list
         .iter()
-        .map(|case| Truth::of(case, &mesh, boundary, &mut yard))
+        .map(|case| Truth::of(case, mesh, posed.boundary, &mut yard))
         .collect();
     let figures: Vec<CaseFigures> = cases
         .list
@@ -66,13 +59,14 @@ pub fn report(options: &Options) -> Result<ExitCode> {
     let mut rows = row::rows(&label, &figures);
     let mut details = vec![json!({"method": label.drive, "cases": figures})];
     let mut all = Vec::new();
-    let methods = methods(options, &bundles);
+    let methods = methods(options, &posed.bundles);
+    let mut notes = Vec::new();
     for method in &methods {
         let name = method.name();
         match method.measure(
             options.most_threads(),
-            &cases,
-            &mesh,
+            cases,
+            mesh,
             &truths,
             &mut yard,
             &progress::watch(false),
@@ -88,27 +82,21 @@ pub fn report(options: &Options) -> Result<ExitCode> {
     if all.is_empty() {
         bail!("nothing could be measured: {}", notes.join("; "));
     }
-    let viewer = film::viewer(&methods, &cases, &mesh, options.most_threads())?;
+    let viewer = film::viewer(&methods, cases, mesh, options.most_threads())?;
+    posed.notes.extend(notes);
     let made = Made {
-        cases,
-        mesh,
+        posed,
         viewer,
         truths,
         all,
         rows,
         details,
-        notes,
     };
     let report = write(options, &made)?;
-    if options.json {
-        println!("{}", serde_json::to_string_pretty(&report)?);
-    } else {
-        print!("{}", table::text(&made.rows));
-        for note in &made.notes {
-            println!("left out: {note}");
-        }
-        println!("{}", options.out.join("tools.html").display());
-    }
+    let publisher = options.publisher();
+    publisher.say(&table::text(&made.rows));
+    publisher.end(&report, &made.posed.notes)?;
+    publisher.say(&options.out.join("tools.html").to_string_lossy());
     Ok(ExitCode::SUCCESS)
 }
 

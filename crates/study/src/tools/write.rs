@@ -9,6 +9,8 @@ use tissue::mesh::Mesh;
 use super::measured::Measured;
 use super::row::{ALL, Row};
 use super::{force, page, section, table};
+use crate::posed::Posed;
+use crate::publish;
 use crate::report::options::Options;
 use crate::table::Table;
 use upt_cli::counted::counted;
@@ -16,7 +18,6 @@ use upt_cli::marks::replace_between;
 use upt_cli::plot::colour;
 use yardstick::cases::ToolCases;
 use yardstick::drive::Drive;
-use yardstick::machine::Machine;
 use yardstick::measure::{Outcome, Truth};
 
 /// The first case of each programme, with every method in it.
@@ -57,78 +58,28 @@ fn pictures(
 
 /// What a report is written from.
 pub(super) struct Made {
-    pub cases: ToolCases,
-    pub mesh: Mesh,
+    pub posed: Posed,
     pub viewer: Option<String>,
     pub truths: Vec<Truth>,
     pub all: Vec<Measured>,
     pub rows: Vec<Row>,
     pub details: Vec<serde_json::Value>,
-    pub notes: Vec<String>,
 }
 
 /// Writes all of it; returns what tools.json holds.
 pub(super) fn write(options: &Options, made: &Made) -> Result<serde_json::Value> {
     let Made {
-        cases,
-        mesh,
-        viewer,
-        truths,
-        all,
-        rows,
-        details,
-        notes,
+        posed, all, rows, ..
     } = made;
-    std::fs::create_dir_all(&options.out)
-        .with_context(|| format!("cannot make {}", options.out.display()))?;
-    let machine = Machine::this();
-    let header = &cases.list[0].trajectory.header;
-    let date = crate::date::date();
-    let report = json!({
-        "machine": machine,
-        "date": date,
-        "threads": options.most_threads(),
-        "versions": {"upt": env!("CARGO_PKG_VERSION"), "solver": header.solver},
-        "mesh": {"name": header.mesh_name, "sha256": cases.mesh_sha256, "nodes": mesh.node_count(), "boundary": cases.boundary},
-        "rows": rows,
-        "methods": details,
-        "left_out": notes,
-    });
-    std::fs::write(
-        options.out.join("tools.json"),
-        serde_json::to_string_pretty(&report)? + "\n",
-    )?;
+    let threads = options.most_threads();
+    let mut report = posed.origin(threads);
+    report["rows"] = json!(rows);
+    report["methods"] = json!(made.details);
+    publish::file(&options.out.join("tools.json"), &report)?;
     let lead = format!(
-        "{} of rigid tools on {} ({} nodes), every method driven by the tools' poses alone.",
-        counted(cases.list.len(), "case"),
-        header.mesh_name,
-        mesh.node_count()
+        "{}, every method driven by the tools' poses alone.",
+        posed.said()
     );
-    let facts = vec![
-        (
-            "machine".into(),
-            format!("{}, {} cores, {}", machine.cpu, machine.cores, machine.os),
-        ),
-        ("date".into(), date.clone()),
-        ("threads".into(), options.most_threads().to_string()),
-        (
-            "versions".into(),
-            format!(
-                "upt {}, reference {}",
-                env!("CARGO_PKG_VERSION"),
-                header.solver
-            ),
-        ),
-        (
-            "cases".into(),
-            cases
-                .list
-                .iter()
-                .map(|case| case.name.as_str())
-                .collect::<Vec<_>>()
-                .join("; "),
-        ),
-    ];
     let page = page::Page {
         title: options.title.as_deref().unwrap_or("From pose to picture"),
         lead: lead.clone(),
@@ -138,18 +89,22 @@ pub(super) fn write(options: &Options, made: &Made) -> Result<serde_json::Value>
             .enumerate()
             .map(|(at, one)| (one.name.clone(), colour(at)))
             .collect(),
-        pictured: pictures(cases, mesh, truths, all),
-        viewer: viewer.clone(),
-        notes: notes.iter().map(|n| format!("Left out: {n}")).collect(),
-        facts,
+        pictured: pictures(&posed.cases, &posed.mesh, &made.truths, all),
+        viewer: made.viewer.clone(),
+        notes: posed
+            .notes
+            .iter()
+            .map(|n| format!("Left out: {n}"))
+            .collect(),
+        facts: posed.facts(threads),
     };
     std::fs::write(options.out.join("tools.html"), page::page(&page))?;
     let made = format!(
-        "{lead} {} ({}, {}), {date}.",
-        machine.cpu,
-        counted(machine.cores, "core"),
-        counted(options.most_threads() as usize, "thread")
+        "{lead} {}, {}.",
+        counted(threads as usize, "thread"),
+        posed.place()
     );
+    let header = posed.header();
     for path in &options.markdown {
         let cases = match header.boundary.as_str() {
             "fixed" => header.mesh_name.clone(),
