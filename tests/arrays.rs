@@ -1,7 +1,5 @@
 //! The Rust interface with fields as arrays: the same bits as with slices, and errors that say what to do.
 
-mod fixture;
-
 use ndarray::{Array2, s};
 use upt::{Contact, IndexSet, Model, ModelOptions, SceneOptions, StepInput};
 

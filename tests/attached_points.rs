@@ -1,7 +1,5 @@
 //! Points attached to the tissue: interpolated between nodes, or decoded by the network.
 
-mod fixture;
-
 use std::sync::Arc;
 
 use fixture::{BUNDLES, bits, largest_difference, model, plain, push, rollout, scene, sparse};

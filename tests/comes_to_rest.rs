@@ -1,7 +1,5 @@
 //! Every bundle that ships falls asleep after a push, wherever and however it was pushed: an idle scene costs nothing.
 
-mod fixture;
-
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -30,7 +28,7 @@ const PATIENCE: usize = 400;
 
 /// The slowest first, so that none of them is left alone at the end.
 fn shipped() -> Vec<PathBuf> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("onnx");
+    let folder = fixture::root().join("onnx");
     let mut found: Vec<PathBuf> = std::fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path())

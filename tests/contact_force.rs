@@ -1,8 +1,6 @@
 //! The reaction at the contact nodes: which method, whose numbers, and that it belongs to the published contact.
 #![cfg(feature = "instruments")]
 
-mod fixture;
-
 use fixture::{BUNDLES, bits, model, path, plain, push, scene, sparse};
 use safetensors::SafeTensors;
 use upt::forces::ReactionForces;

@@ -1,8 +1,6 @@
 //! Corrections by the elements: what they do to the residual, what they cost a scene without them, and what is refused.
 
-mod fixture;
-
-use fixture::draw::Draw;
+use fixture::Draw;
 use fixture::{bits, model, plain, push, rollout, scene, sparse};
 use upt::{Contact, Corrections, Error, IndexSet, SceneOptions, flag};
 
@@ -175,7 +173,7 @@ fn wild_contacts_stay_finite_and_the_tissue_comes_back() {
     for count in [1, 3, 5, 10] {
         let scene = scene(&model, &with(Corrections::Fixed(count)));
         let mut draw = Draw(7 + u64::from(count));
-        let mut unit = || draw.next();
+        let mut unit = || draw.unit();
         let mut out = vec![0.0; 3 * scene.node_count()];
         for _ in 0..300 {
             let first = (unit() * (domain.len() - 4) as f32) as usize;

@@ -5,10 +5,7 @@
 )]
 #![cfg(target_arch = "x86_64")]
 
-mod fixture;
-mod host;
-
-use host::Host;
+use fixture::host::{self, Host};
 use upt::ffi::*;
 use upt::kernels::flush::read_mode;
 

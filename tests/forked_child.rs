@@ -5,12 +5,9 @@
 )]
 #![cfg(unix)]
 
-mod fixture;
-mod host;
-
 use std::ptr::null_mut;
 
-use host::Host;
+use fixture::host::{self, Host};
 use upt::ffi::*;
 
 /// Verifies REQ-016.

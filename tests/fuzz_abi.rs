@@ -5,7 +5,6 @@
 
 mod abi;
 mod explore;
-mod fixture;
 
 use proptest::collection::vec;
 

@@ -1,7 +1,6 @@
 //! Damaged bytes of bundles and snapshots: an error, or what the undamaged bytes give; never a crash.
 
 mod explore;
-mod fixture;
 
 use std::path::Path;
 use std::sync::Arc;

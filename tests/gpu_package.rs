@@ -2,8 +2,6 @@
 //! report holds the rows of what ran and a reason for everything that did not.
 #![cfg(target_os = "linux")]
 
-mod fixture;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

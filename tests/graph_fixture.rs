@@ -1,7 +1,5 @@
 //! Supernodes and radius graph against the fixture that Python wrote (`training/scripts/make_fixtures.py`).
 
-mod fixture;
-
 use upt::bundle::{Graph, TensorFile};
 use upt::graph::{SupernodeGraph, node_key};
 

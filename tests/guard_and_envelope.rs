@@ -1,7 +1,5 @@
 //! What the guard refuses, what each policy does then, and when the envelope's flags are set.
 
-mod fixture;
-
 use fixture::{BUNDLES, bits, copy_of, find_runtime, model, plain, push, rollout, scene, sparse};
 use upt::{
     Contact, Error, GuardPolicy, IndexSet, Model, ModelOptions, SceneOptions, StepInput, flag,

@@ -1,7 +1,6 @@
 //! The force of one tool between steps: what a hand feels.
 #![cfg(feature = "instruments")]
 
-mod fixture;
 #[path = "haptics/loads.rs"]
 mod loads;
 #[path = "haptics/sideways.rs"]

@@ -6,11 +6,7 @@
 )]
 #![cfg(all(target_os = "linux", target_env = "gnu"))]
 
-mod fixture;
-mod host;
-
-use std::path::{Path, PathBuf};
-
+use fixture::host;
 use upt::ffi::*;
 
 /// Bytes that malloc has given out.
@@ -22,9 +18,7 @@ fn allocated() -> f64 {
 
 /// Bytes of this process in memory.
 fn resident() -> f64 {
-    let text = std::fs::read_to_string("/proc/self/statm").unwrap();
-    let pages: f64 = text.split(' ').nth(1).unwrap().parse().unwrap();
-    pages * 4096.0
+    gauge::resident_bytes().unwrap() as f64
 }
 
 /// Scenes of a model that have made some steps in contact.
@@ -57,12 +51,6 @@ fn destroy(scenes: Vec<*mut upt_scene>) {
     }
 }
 
-fn brain(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("onnx")
-        .join(name)
-}
-
 /// One test: another one's allocations would be counted.
 /// Verifies REQ-035.
 #[test]
@@ -75,7 +63,7 @@ fn memory_is_stated_to_ten_percent_and_given_back() {
         "brain-reduced",
     ];
     for name in bundles {
-        let model = host::open(&brain(name));
+        let model = host::open(&fixture::shipped(name));
         for (cubic, points) in [(0, 0), (1, 500)] {
             let mut options = host::scene_options();
             options.cubic_sampling = cubic;
@@ -106,7 +94,7 @@ fn memory_is_stated_to_ten_percent_and_given_back() {
         }
         assert_eq!(unsafe { upt_model_destroy(model) }, UPT_OK);
     }
-    let model = host::open(&brain("brain-reduced"));
+    let model = host::open(&fixture::shipped("brain-reduced"));
     let options = host::scene_options();
     destroy(stepped(model, &options, 1));
     let before = resident();

@@ -4,14 +4,11 @@
     reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
 )]
 
-mod fixture;
-mod host;
-
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr::{null_mut, without_provenance_mut};
 use std::sync::Mutex;
 
-use host::Host;
+use fixture::host::{self, Host};
 use upt::ffi::*;
 
 static HEARD: Mutex<Vec<(i32, String)>> = Mutex::new(Vec::new());

@@ -1,8 +1,6 @@
 //! What a process has mapped after it used the library: nothing of a GPU, and no ONNX Runtime before a model needs it.
 #![cfg(target_os = "linux")]
 
-mod fixture;
-
 use std::collections::BTreeSet;
 
 use fixture::{BUNDLES, find_runtime, model, plain, rollout, scene};

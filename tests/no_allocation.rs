@@ -6,8 +6,6 @@
     reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
 )]
 
-mod fixture;
-
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -1,7 +1,5 @@
 //! Scenes whose tissue is damped otherwise than the bundle says: what they refuse, and that they swing as long as they should.
 
-mod fixture;
-
 use fixture::{bits, model, plain, scene};
 use upt::{Contact, Corrections, Error, Scene, SceneOptions};
 

@@ -1,8 +1,6 @@
 //! Scenes whose steps are shorter than the bundle's: what they refuse, and that they are the same tissue.
 #![cfg(feature = "instruments")]
 
-mod fixture;
-
 use contact::Shape;
 use fixture::{bits, model, plain, scene};
 use upt::contact::Tool;
@@ -230,9 +228,7 @@ fn a_collision_field_drives_it_too() {
 /// form they once rang, and single nodes ran away by millimetres.
 #[test]
 fn a_fine_mesh_comes_to_rest_in_short_steps() {
-    fixture::find_runtime();
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/brain-reduced");
-    let model = upt::Model::open(&folder, &upt::ModelOptions::default()).unwrap();
+    let model = model(fixture::shipped("brain-reduced"));
     let options = SceneOptions {
         corrections: Corrections::Fixed(3),
         step_s: 0.01,

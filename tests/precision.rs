@@ -1,12 +1,9 @@
 //! Narrower graphs: the variant that the manifest lists is what runs, and one that is not there is an error that says so.
 
-mod fixture;
-
 use std::path::Path;
 use std::sync::Arc;
 
 use fixture::{BUNDLES, bits, copy_of, find_runtime, plain, rollout, scene};
-use sha2::{Digest, Sha256};
 use upt::{DecoderKernel, Error, Model, ModelOptions, Precision, SceneOptions};
 
 fn open(path: &Path, precision: Precision) -> upt::Result<Arc<Model>> {
@@ -19,9 +16,7 @@ fn open(path: &Path, precision: Precision) -> upt::Result<Arc<Model>> {
 
 /// Adds `int8` graphs to a copy of a bundle: the float32 graphs after `change`.
 fn with_int8(folder: &Path, change: impl Fn(&str, Vec<u8>) -> Vec<u8>) {
-    let path = folder.join("bundle.json");
-    let mut manifest: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    let mut manifest = fixture::manifest(folder);
     manifest["precisions"] = serde_json::json!(["f32", "int8"]);
     for name in ["latent", "decoder"] {
         let Ok(bytes) = std::fs::read(folder.join(format!("{name}.onnx"))) else {
@@ -29,12 +24,8 @@ fn with_int8(folder: &Path, change: impl Fn(&str, Vec<u8>) -> Vec<u8>) {
         };
         let bytes = change(name, bytes);
         let file = format!("{name}.int8.onnx");
-        let digest: String = Sha256::digest(&bytes)
-            .iter()
-            .map(|b| format!("{b:02x}"))
-            .collect();
         std::fs::write(folder.join(&file), &bytes).unwrap();
-        manifest["files"][file] = serde_json::json!({"bytes": bytes.len(), "sha256": digest});
+        manifest["files"][file] = fixture::entry(&bytes);
     }
     fixture::write_manifest(folder, &mut manifest);
 }

@@ -1,7 +1,6 @@
 //! The tissue between steps: what a frame shows of it.
 #![cfg(feature = "instruments")]
 
-mod fixture;
 #[path = "present/pierced.rs"]
 mod pierced;
 #[path = "present/relaxing.rs"]

@@ -1,16 +1,14 @@
 //! Tools that a sample of the surface alone would miss: quick ones, thin ones, ones that start in the tissue, and grasps that leap.
 #![cfg(feature = "instruments")]
 
-use std::path::Path;
 use std::sync::Arc;
 
 use contact::{Rotation, Shape, Vector};
 use upt::contact::{Mode, Tool, ToolReading};
-use upt::{Contact, Corrections, Model, ModelOptions, Scene, SceneOptions, View, flag};
+use upt::{Contact, Corrections, Model, Scene, SceneOptions, View, flag};
 
 fn model() -> Arc<Model> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/liver-coarse");
-    Model::open(&path, &ModelOptions::default()).unwrap()
+    fixture::model(fixture::shipped("liver-coarse"))
 }
 
 fn scene(model: &Arc<Model>, corrections: Corrections) -> Scene {
@@ -137,8 +135,7 @@ fn blade(scene: &Scene, node: u32, height: f32) -> Tool {
 /// Verifies REQ-040.
 #[test]
 fn a_blade_that_leaps_while_it_presses_does_not_pass_through() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/brain-coarse-reduced");
-    let model = Model::open(&path, &ModelOptions::default()).unwrap();
+    let model = fixture::model(fixture::shipped("brain-coarse-reduced"));
     let scene = |substeps| {
         let corrections = Corrections::Auto {
             most: 10,

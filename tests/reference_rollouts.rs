@@ -1,8 +1,6 @@
 //! A scene against independent references: numpy for kind `reduced`, the bundle's own graphs and the rollout of the
 //! Python evaluation for kind `upt`.
 
-mod fixture;
-
 use fixture::{largest_difference, model, path, plain, push, scene, sparse};
 use upt::bundle::TensorFile;
 use upt::onnx::{ProviderPlan, Runtime, Stage, StageOptions};

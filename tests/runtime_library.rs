@@ -1,7 +1,5 @@
 //! Finding ONNX Runtime: what is missing or broken gives a clear error and no hang, and a good one still loads after.
 
-mod fixture;
-
 use std::path::PathBuf;
 
 use upt::{InitOptions, Model, ModelOptions, Provider, SceneOptions};

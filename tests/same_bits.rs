@@ -1,7 +1,5 @@
 //! The same bits for any thread count, region, form of input, and instance.
 
-mod fixture;
-
 use fixture::{BUNDLES, bits, largest_difference, model, plain, push, rollout, scene, sparse};
 use upt::{Contact, DecoderKernel, IndexSet, SceneOptions, StepInput};
 

@@ -4,12 +4,9 @@
     reason = "a host in a test: every call keeps to the header, or breaks it on purpose"
 )]
 
-mod fixture;
-mod host;
-
 use std::sync::Mutex;
 
-use host::Host;
+use fixture::host::{self, Host};
 use upt::ffi::*;
 
 /// Of a step; the thread itself has some of it.
@@ -31,11 +28,15 @@ unsafe impl Send for Shared {}
 /// Verifies REQ-017.
 #[test]
 fn calls_stay_within_the_stated_stack() {
-    let brain = concat!(env!("CARGO_MANIFEST_DIR"), "/onnx/brain-coarse");
-    for bundle in fixture::BUNDLES.into_iter().chain([brain]) {
+    let brain = fixture::shipped("brain-coarse");
+    for bundle in fixture::BUNDLES
+        .map(fixture::path)
+        .into_iter()
+        .chain([brain])
+    {
         for kernel in [UPT_KERNEL_NATIVE, UPT_KERNEL_ONNX] {
             let shared = on_a_stack_of(OPEN, || {
-                let host = Host::new(bundle, |options| {
+                let host = Host::new(&bundle, |options| {
                     options.kernel = kernel;
                     options.check_inversion = 1;
                 });
@@ -78,9 +79,9 @@ fn steps_with_tools_stay_within_the_stated_stack() {
     use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, Shape, Tool, Vector, View};
 
     fixture::find_runtime();
-    let brain = concat!(env!("CARGO_MANIFEST_DIR"), "/onnx/brain-coarse-reduced");
+    let brain = fixture::shipped("brain-coarse-reduced");
     let scene = on_a_stack_of(OPEN, || {
-        let model = Model::open(brain.as_ref(), &ModelOptions::default()).unwrap();
+        let model = Model::open(&brain, &ModelOptions::default()).unwrap();
         let options = SceneOptions {
             guard_policy: upt::GuardPolicy::Report,
             ..SceneOptions::default()

@@ -1,7 +1,5 @@
 //! A snapshot whose state cannot be computed again changes nothing.
 
-mod fixture;
-
 use fixture::{bits, copy_of, find_runtime, plain, push, renew_hash, scene};
 use sha2::{Digest, Sha256};
 use upt::{Contact, Model, ModelOptions, Scene};

@@ -1,11 +1,8 @@
 //! `step.onnx` against the split: the same displacements to rounding, and every promise of a scene kept on it.
 
-mod fixture;
-
 use fixture::{
     bits, copy_of, find_runtime, largest_difference, model, plain, push, rollout, scene, sparse,
 };
-use sha2::{Digest, Sha256};
 use upt::{
     DecoderKernel, Error, IndexSet, Model, ModelOptions, Scene, SceneOptions, StepPath, UserStream,
 };
@@ -195,10 +192,8 @@ fn a_missing_or_wrong_step_graph_is_named() {
     // Another graph under its name: the split still runs, the whole step says what is wrong.
     let bytes = std::fs::read(folder.path().join("decoder.onnx")).unwrap();
     std::fs::write(folder.path().join("step.onnx"), &bytes).unwrap();
-    let digest = Sha256::digest(&bytes);
-    let digest: String = digest.iter().map(|b| format!("{b:02x}")).collect();
     manifest = full;
-    manifest["files"]["step.onnx"] = serde_json::json!({"bytes": bytes.len(), "sha256": digest});
+    manifest["files"]["step.onnx"] = fixture::entry(&bytes);
     fixture::write_manifest(folder.path(), &mut manifest);
     let error = create(folder.path(), StepPath::Whole).err().unwrap();
     assert!(matches!(error, Error::Bundle { .. }), "{error}");

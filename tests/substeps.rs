@@ -1,8 +1,6 @@
 //! Steps that are made of shorter ones where one alone would miss the target: when, what they gain, and what is refused.
 #![cfg(feature = "instruments")]
 
-mod fixture;
-
 use contact::{Shape, Vector};
 use fixture::{bits, model, plain, scene};
 use upt::contact::{Mode, Tool};

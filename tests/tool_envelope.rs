@@ -1,8 +1,6 @@
 //! Flags in the terms of tools: a bundle whose manifest says which rigid tools it is good for (`envelope.tools`).
 #![cfg(feature = "instruments")]
 
-mod fixture;
-
 use std::sync::Arc;
 
 use contact::{Shape, Vector};

@@ -5,16 +5,13 @@
     reason = "a host in a test: every call keeps to the header"
 )]
 
-mod fixture;
-mod host;
-
 use std::collections::HashSet;
 use std::ffi::{CStr, c_char, c_void};
 use std::path::Path;
 use std::ptr::null_mut;
 use std::sync::Mutex;
 
-use host::{Host, ball};
+use fixture::host::{Host, ball};
 use serde_json::Value;
 use upt::ffi::*;
 

@@ -1,7 +1,5 @@
 //! Options that make no sense on this machine, and points that are no places, are told with their names.
 
-mod fixture;
-
 use upt::kernels::decoder::DecoderPrecision;
 use upt::{ModelOptions, Precision, Provider, SceneOptions};
 

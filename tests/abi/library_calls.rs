@@ -7,7 +7,6 @@ use upt::ffi::*;
 
 use super::inputs::*;
 use super::{Call, Function, Odd, Size, World};
-use crate::fixture;
 
 /// `upt_model_read_support` and `upt_model_read_region`.
 type Named =

@@ -8,7 +8,6 @@ use upt::ffi::*;
 use super::inputs::{UNTOUCHED, count, message, pointer_mut};
 use super::traps::trapped;
 use super::{Call, Documented, Function, Size};
-use crate::fixture;
 
 /// The host's side.
 pub struct World<'a> {

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::fixture::{self, copy_of, find_runtime};
 use super::open;
+use fixture::{self, copy_of, find_runtime};
 use upt::{Model, ModelOptions};
 
 /// What networks of one body have in common.

@@ -1,8 +1,6 @@
 //! Every damage of a bundle is an error that names file and field, never a crash.
 
 mod body;
-#[path = "../fixture/mod.rs"]
-mod fixture;
 mod manifest;
 mod ragged;
 
@@ -66,7 +64,7 @@ fn missing_short_and_altered_files_are_named() {
 
 #[test]
 fn files_in_memory_are_a_bundle_too() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/liver-coarse");
+    let folder = fixture::shipped("liver-coarse");
     let files = || -> BTreeMap<String, Vec<u8>> {
         let entries = std::fs::read_dir(&folder).unwrap();
         let paths = entries.map(|entry| entry.unwrap().path());

@@ -1,7 +1,7 @@
 //! Fields of a manifest that are wrong, each by its name.
 
-use super::fixture::{copy_of, find_runtime};
 use super::{open, with_manifest};
+use fixture::{copy_of, find_runtime};
 
 /// Verifies REQ-001.
 #[test]
@@ -374,7 +374,7 @@ fn a_digest_that_is_null_is_refused_and_a_missing_one_is_not() {
     find_runtime();
     let folder = copy_of("tiny-upt");
     let path = folder.path().join("bundle.json");
-    let mut manifest = crate::fixture::manifest(folder.path());
+    let mut manifest = fixture::manifest(folder.path());
     manifest["manifest_sha256"] = serde_json::Value::Null;
     std::fs::write(&path, manifest.to_string()).unwrap();
     let text = open(folder.path()).unwrap_err().to_string();

@@ -6,8 +6,8 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, TensorView};
 use safetensors::{SafeTensors, serialize};
 
-use super::fixture::{self, copy_of, find_runtime};
 use super::open;
+use fixture::{self, copy_of, find_runtime};
 use half::f16;
 use upt::{Model, ModelOptions};
 

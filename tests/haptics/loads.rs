@@ -1,8 +1,8 @@
 //! Hands in tissue under loads: gravity, ties, and what relaxing tissue remembers.
 
-use super::fixture::relaxing;
 use super::*;
 use contact::Vector;
+use fixture::relaxing;
 use upt::{Loads, Spring, StepInput, Tie, TieEnd, TiePoint};
 
 /// Under a hand that holds still the force falls as the steps say, and runs on between them.

@@ -1,7 +1,6 @@
 //! A ball that dents the tissue between its samples: a hand keeps it until the next step.
 
 use super::*;
-use std::path::Path;
 use upt::{Model, ModelOptions};
 
 /// Of the ball, mm, and of a step, s.
@@ -12,7 +11,7 @@ const STEP_S: f64 = 0.02;
 /// for the rest of a step.
 #[test]
 fn a_small_ball_that_has_stopped_is_felt_in_each_millisecond() {
-    let model = Model::open(Path::new("onnx/brain"), &ModelOptions::default()).unwrap();
+    let model = Model::open(&fixture::shipped("brain"), &ModelOptions::default()).unwrap();
     let options = SceneOptions {
         step_s: STEP_S,
         ..SceneOptions::default()

@@ -9,7 +9,7 @@ use upt::{
 
 /// A liver whose held nodes are two groups, with the folder that it reads on from.
 fn open() -> (tempfile::TempDir, Scene) {
-    let folder = fixture::with_groups("../../onnx/liver-coarse");
+    let folder = fixture::with_groups(fixture::shipped("liver-coarse"));
     let model = Model::open(folder.path(), &ModelOptions::default()).unwrap();
     (folder, Scene::new(model, &options()).unwrap())
 }

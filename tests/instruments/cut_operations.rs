@@ -3,8 +3,8 @@
 //! 150 operations; 10,000 with `UPT_NIGHTLY=1`. `UPT_FUZZ_SEED` is where their numbers begin. The counts are printed.
 
 use super::*;
-use crate::fixture::draw::Draw;
-use upt::{Error, GuardPolicy, Model, ModelOptions, flag};
+use fixture::Draw;
+use upt::{Error, GuardPolicy, flag};
 
 /// Operations to a body; then the intact one takes its place.
 const TO_A_BODY: usize = 12;
@@ -26,9 +26,9 @@ struct Counts {
 /// Does something to the body at a place.
 fn operate(scene: &Scene, draw: &mut Draw, at: Vector, normal: Vector) -> Result<usize, Error> {
     let along = normal.any_orthonormal_vector();
-    let along = along.lerp(normal.cross(along), draw.next()).normalize();
+    let along = along.lerp(normal.cross(along), draw.unit()).normalize();
     let before = scene.node_count();
-    match (6.0 * draw.next()) as u32 {
+    match (6.0 * draw.unit()) as u32 {
         0..=2 => {
             let (long, deep) = (draw.within(5.0, 60.0), draw.within(3.0, 25.0));
             let bend = normal.cross(along) * draw.within(-4.0, 4.0);
@@ -41,7 +41,7 @@ fn operate(scene: &Scene, draw: &mut Draw, at: Vector, normal: Vector) -> Result
                 edge(0.5 * deep, bend),
                 edge(deep, Vector::ZERO),
             ];
-            let stroke = (3.0 * draw.next()) as u32;
+            let stroke = (3.0 * draw.unit()) as u32;
             scene.cut(stroke, 2, poses.as_flattened())?;
         }
         3 => {
@@ -52,7 +52,7 @@ fn operate(scene: &Scene, draw: &mut Draw, at: Vector, normal: Vector) -> Result
             scene.remove(&tool, draw.within(10.0, 300.0))?;
         }
         4 => {
-            let first = (draw.next() * 12_000.0) as u32;
+            let first = (draw.unit() * 12_000.0) as u32;
             let elements: Vec<u32> = (first..first + 60).collect();
             scene.scale_stiffness(&elements, draw.within(0.4, 2.5))?;
         }
@@ -72,8 +72,7 @@ fn random_operations_leave_every_state_finite_and_none_is_lost() {
         0 => 150,
         _ => 10_000,
     };
-    let path = std::path::Path::new("onnx/brain-coarse-reduced");
-    let model = Model::open(path, &ModelOptions::default()).unwrap();
+    let model = fixture::model(fixture::shipped("brain-coarse-reduced"));
     let options = SceneOptions {
         corrections: Corrections::Fixed(3),
         guard_policy: GuardPolicy::Blend,
@@ -90,7 +89,7 @@ fn random_operations_leave_every_state_finite_and_none_is_lost() {
             scene.reset().unwrap();
             assert_eq!(scene.node_count(), mesh.node_count());
         }
-        let face = faces[(draw.next() * faces.len() as f32) as usize % faces.len()];
+        let face = faces[(draw.unit() * faces.len() as f32) as usize % faces.len()];
         let [a, b, c] = face.map(place);
         let (at, normal) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize());
         let saved = scene.save().unwrap();

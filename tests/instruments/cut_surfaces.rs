@@ -24,7 +24,7 @@ fn follow(scene: *mut upt_scene) -> (upt_surface, Kept) {
         let mut out: upt_surface = std::mem::zeroed();
         out.struct_size = size_of::<upt_surface>() as u32;
         let status = upt_scene_update_surface(scene, &mut out);
-        assert_eq!(status, UPT_OK, "{}", crate::host::message());
+        assert_eq!(status, UPT_OK, "{}", fixture::host::message());
         let mut kept = Kept {
             rest: vec![0.0; 3 * out.vertex_count as usize],
             triangles: vec![[0; 3]; out.triangle_count as usize],
@@ -41,7 +41,7 @@ fn follow(scene: *mut upt_scene) -> (upt_surface, Kept) {
             kept.changed.as_mut_ptr(),
             out.changed_count,
         );
-        assert_eq!(status, UPT_OK, "{}", crate::host::message());
+        assert_eq!(status, UPT_OK, "{}", fixture::host::message());
         (out, kept)
     }
 }
@@ -93,10 +93,10 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
     let own = Scene::new(liver(), &options()).unwrap();
     let tool = pressing(&own, 4.0, Vector::ZERO);
     let edge = slit(&own, 6.0, 15.0);
-    let model = crate::host::open(std::path::Path::new("onnx/liver-coarse"));
-    let mut made = crate::host::scene_options();
+    let model = fixture::host::open(&fixture::shipped("liver-coarse"));
+    let mut made = fixture::host::scene_options();
     (made.corrections.mode, made.corrections.count) = (UPT_CORRECTIONS_COUNT, 5);
-    let scene = crate::host::create(model, &made);
+    let scene = fixture::host::create(model, &made);
     // SAFETY: zeros are values of these structs, and each call keeps to the header.
     unsafe {
         let mut one: upt_instrument = std::mem::zeroed();
@@ -116,7 +116,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         let mut cut: upt_cut = std::mem::zeroed();
         cut.struct_size = size_of::<upt_cut>() as u32;
         let status = upt_scene_cut(scene, 0, edge.as_flattened().as_ptr(), 2, 2, &mut cut);
-        assert_eq!(status, UPT_OK, "{}", crate::host::message());
+        assert_eq!(status, UPT_OK, "{}", fixture::host::message());
         assert_eq!(cut.is_changed, 1);
         let mut nodes = 0;
         assert_eq!(upt_scene_read_node_count(scene, &mut nodes), UPT_OK);
@@ -168,11 +168,11 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         let mut u = vec![0.0; 3 * nodes as usize];
         for _ in 0..4 {
             let status = upt_scene_step(scene, &input, u.as_mut_ptr(), u.len() as u64);
-            assert_eq!(status, UPT_OK, "{}", crate::host::message());
+            assert_eq!(status, UPT_OK, "{}", fixture::host::message());
             step(&own, std::slice::from_ref(&tool));
         }
         let status = upt_scene_read_surface_positions(scene, at.as_mut_ptr(), floats);
-        assert_eq!(status, UPT_OK, "{}", crate::host::message());
+        assert_eq!(status, UPT_OK, "{}", fixture::host::message());
         let mut in_rust = vec![0.0; at.len()];
         own.surface_positions(&mut in_rust).unwrap();
         assert_eq!(bits(&at), bits(&in_rust));

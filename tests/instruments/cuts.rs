@@ -5,9 +5,7 @@ use upt::Error;
 use upt::ffi::*;
 
 pub(crate) fn liver() -> std::sync::Arc<upt::Model> {
-    fixture::find_runtime();
-    let path = std::path::Path::new("onnx/liver-coarse");
-    upt::Model::open(path, &upt::ModelOptions::default()).unwrap()
+    model(fixture::shipped("liver-coarse"))
 }
 
 pub(crate) fn options() -> SceneOptions {
@@ -156,10 +154,10 @@ fn a_host_in_c_cuts_as_one_in_rust() {
     let (own, tool) = pressed();
     let tools = std::slice::from_ref(&tool);
     let edge = slit(&own, 6.0, 15.0);
-    let model = crate::host::open(std::path::Path::new("onnx/liver-coarse"));
-    let mut options = crate::host::scene_options();
+    let model = fixture::host::open(&fixture::shipped("liver-coarse"));
+    let mut options = fixture::host::scene_options();
     (options.corrections.mode, options.corrections.count) = (UPT_CORRECTIONS_COUNT, 5);
-    let scene = crate::host::create(model, &options);
+    let scene = fixture::host::create(model, &options);
     // SAFETY: zeros are values of these structs, and each call keeps to the header.
     unsafe {
         let mut one: upt_instrument = std::mem::zeroed();
@@ -170,7 +168,7 @@ fn a_host_in_c_cuts_as_one_in_rust() {
         let input = upt_input::of_instruments(std::slice::from_ref(&one));
         let step_in_c = |out: &mut [f32]| {
             let status = upt_scene_step(scene, &input, out.as_mut_ptr(), out.len() as u64);
-            assert_eq!(status, UPT_OK, "{}", crate::host::message());
+            assert_eq!(status, UPT_OK, "{}", fixture::host::message());
         };
         let mut u = vec![0.0f32; 3 * own.node_count()];
         for _ in 0..6 {
@@ -198,7 +196,7 @@ fn a_host_in_c_cuts_as_one_in_rust() {
             upt_scene_cut(scene, 0, at, 2, 2, &mut out),
             UPT_OK,
             "{}",
-            crate::host::message()
+            fixture::host::message()
         );
         let cut = own.cut(0, 2, &edge).unwrap();
         assert_eq!(out.node_count, own.node_count() as u64);
@@ -222,7 +220,7 @@ fn a_host_in_c_cuts_as_one_in_rust() {
         let status = upt_scene_read(
             scene,
             u.as_mut_ptr(),
-            3 * crate::host::node_count(model) as u64,
+            3 * fixture::host::node_count(model) as u64,
         );
         assert_eq!(status, UPT_OK);
         upt_scene_destroy(scene);

@@ -1,12 +1,12 @@
 //! Tools that a host had better not have: deep inside, wild, as large as the organ, or impossible and refused.
 
-use crate::fixture::draw::Draw;
 use contact::{Shape, Vector};
+use fixture::Draw;
 use upt::contact::{Mode, Tool};
 use upt::{Contact, Error, SceneOptions, flag};
 
-use super::fixture::{model, plain, scene};
 use super::{ball, pressing, readings, site, step, with};
+use fixture::{model, plain, scene};
 
 /// Verifies REQ-044.
 #[test]
@@ -169,7 +169,7 @@ fn the_same_question_has_the_same_contacts() {
         let (first, second) = (ask(), ask());
         assert_eq!(first, second, "step {t}");
         assert!(!first.0.is_empty());
-        scene.step(super::fixture::sparse(&first), None).unwrap();
+        scene.step(fixture::sparse(&first), None).unwrap();
     }
 }
 

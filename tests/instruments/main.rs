@@ -11,10 +11,6 @@ mod cut_surfaces;
 mod cuts;
 mod cuts_and_truth;
 mod extremes;
-#[path = "../fixture/mod.rs"]
-mod fixture;
-#[path = "../host/mod.rs"]
-mod host;
 mod portable;
 mod regions;
 mod relaxing;

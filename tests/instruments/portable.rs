@@ -21,7 +21,7 @@ fn options() -> ModelOptions {
 /// Of the liver that ships, and of tissue that relaxes by Ogden's law.
 fn rollouts() -> String {
     fixture::find_runtime();
-    let path = std::path::Path::new("onnx/liver-coarse");
+    let path = &fixture::shipped("liver-coarse");
     let model = Model::open(path, &options()).unwrap();
     let (_folder, relaxing) = liver_that_relaxes(Some(-12.0), &options());
     rollout(model) + &rollout(relaxing)
@@ -113,7 +113,7 @@ fn what_cannot_be_portable_is_refused() {
             "{name}"
         );
     }
-    let model = Model::open(std::path::Path::new("onnx/liver-coarse"), &options()).unwrap();
+    let model = Model::open(&fixture::shipped("liver-coarse"), &options()).unwrap();
     let timed = SceneOptions {
         corrections: Corrections::RecommendedWithin { budget_us: 1000 },
         ..SceneOptions::default()

@@ -57,8 +57,7 @@ fn mark(folder: &Path, number: impl Fn(f32) -> i32, laws: &Value, named: &Value)
 }
 
 fn liver() -> tempfile::TempDir {
-    let onnx = Path::new(env!("CARGO_MANIFEST_DIR")).join("onnx/liver-coarse");
-    fixture::copy_from(&onnx)
+    fixture::copy_of(fixture::shipped("liver-coarse"))
 }
 
 /// One region of a law; it has the body's modulus.

@@ -1,12 +1,11 @@
 //! Tissue that relaxes, by Ogden's law and the neo-Hookean one: steps of several lengths, cuts one after the other, snapshots of cut bodies.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use super::cuts::{options, slit};
 use super::cuts_and_truth::{Operation, compare, errors, press};
 use super::*;
-use fixture::{copy_from, relaxing_in};
+use fixture::{copy_of, relaxing_in, shipped};
 use serde_json::json;
 use upt::{Model, ModelOptions};
 
@@ -15,7 +14,7 @@ pub fn liver_that_relaxes(
     alpha: Option<f64>,
     options: &ModelOptions,
 ) -> (tempfile::TempDir, Arc<Model>) {
-    let folder = copy_from(Path::new("onnx/liver-coarse"));
+    let folder = copy_of(shipped("liver-coarse"));
     let branches = json!([{"share": 0.35, "tau_s": 0.12}, {"share": 0.32, "tau_s": 0.6}]);
     let model = relaxing_in(folder.path(), (branches, 1.0), alpha, options);
     (folder, model)

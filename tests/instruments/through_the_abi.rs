@@ -8,7 +8,7 @@ use std::ptr::{null, null_mut};
 
 use upt::ffi::*;
 
-use crate::host::{Host, ball, message};
+use fixture::host::{Host, ball, message};
 
 fn contacts(host: &Host, tool: &upt_instrument) -> (i32, u64) {
     let mut count = 0;

@@ -2,15 +2,15 @@
 //!
 //! 160 steps; 10,000 with `UPT_NIGHTLY=1`. `UPT_FUZZ_SEED` is where their numbers begin. The counts are printed.
 
-use crate::fixture::draw::Draw;
+use fixture::Draw;
 use upt::contact::Tool;
 use upt::{
     Bed, Contact, Corrections, GroupMotion, Loads, Model, ModelOptions, Pressure, Scene,
     SceneOptions, Shape, Spring, StepInput, SupportPose, Tie, TieEnd, TiePoint, Vector,
 };
 
-use crate::fixture::with_groups;
 use crate::ties::place;
+use fixture::with_groups;
 
 /// Steps after which other ties take the place of those that there are, and the ball leaps.
 const TO_A_SITE: usize = 20;
@@ -20,19 +20,17 @@ const PULLED_MM: [f32; 2] = [6.0, 20.0];
 /// How far the group is led in a step, mm.
 const LED_MM: f32 = 0.3;
 
-impl Draw {
-    fn aside(&mut self, most: f32) -> Vector {
-        Vector::from([0; 3].map(|_| self.within(-most, most)))
-    }
+fn aside(draw: &mut Draw, most: f32) -> Vector {
+    Vector::from([0; 3].map(|_| draw.within(-most, most)))
+}
 
-    /// N/m.
-    fn stiffness(&mut self) -> f32 {
-        10f32.powf(self.within(0.5, 4.0))
-    }
+/// N/m.
+fn stiffness(draw: &mut Draw) -> f32 {
+    10f32.powf(draw.within(0.5, 4.0))
+}
 
-    fn node(&mut self, nodes: &[u32]) -> u32 {
-        nodes[(self.next() * nodes.len() as f32) as usize % nodes.len()]
-    }
+fn one_of(draw: &mut Draw, nodes: &[u32]) -> u32 {
+    nodes[(draw.unit() * nodes.len() as f32) as usize % nodes.len()]
 }
 
 #[derive(Debug, Default)]
@@ -48,11 +46,11 @@ struct Counts {
 
 /// A tie of a node to the world, to another or to the ball at `ball`, that pulls by `pulled` mm.
 fn tie(scene: &Scene, draw: &mut Draw, domain: &[u32], ball: Vector, pulled: f32) -> Tie {
-    let (node, other) = (draw.node(domain), draw.node(domain));
+    let (node, other) = (one_of(draw, domain), one_of(draw, domain));
     let own = place(scene, node);
-    let (end, far) = match (3.0 * draw.next()) as u32 {
+    let (end, far) = match (3.0 * draw.unit()) as u32 {
         0 => {
-            let far = own + draw.aside(1.0).normalize_or_zero() * 40.0;
+            let far = own + aside(draw, 1.0).normalize_or_zero() * 40.0;
             (TieEnd::World(far), far)
         }
         1 => {
@@ -74,11 +72,11 @@ fn tie(scene: &Scene, draw: &mut Draw, domain: &[u32], ball: Vector, pulled: f32
         },
         end,
         spring: Spring {
-            stiffness: draw.stiffness(),
+            stiffness: stiffness(draw),
             slack_mm: (own.distance(far) - pulled).max(0.0),
             ..Spring::default()
         },
-        break_mn: [0.0, 80.0][(2.0 * draw.next()) as usize % 2],
+        break_mn: [0.0, 80.0][(2.0 * draw.unit()) as usize % 2],
     }
 }
 
@@ -91,7 +89,7 @@ fn random_loads_together_invert_no_element() {
         0 => 160,
         _ => 10_000,
     };
-    let folder = with_groups("../../onnx/brain-coarse-reduced");
+    let folder = with_groups(fixture::shipped("brain-coarse-reduced"));
     let model = Model::open(folder.path(), &ModelOptions::default()).unwrap();
     let options = SceneOptions {
         corrections: Corrections::Fixed(10),
@@ -107,18 +105,18 @@ fn random_loads_together_invert_no_element() {
     let shape = Shape::Sphere { radius: 4.0 };
     for step in 0..steps {
         if step % TO_A_SITE == 0 {
-            site = place(&scene, draw.node(domain));
+            site = place(&scene, one_of(&mut draw, domain));
             ball = site + Vector::Z * 10.0;
             let bed = Bed {
                 nodes: &[],
                 centre: site.to_array(),
                 radius_mm: draw.within(12.0, 20.0),
                 spring: Spring {
-                    stiffness: draw.stiffness(),
-                    damping: draw.next().round(),
+                    stiffness: stiffness(&mut draw),
+                    damping: draw.unit().round(),
                     ..Spring::default()
                 },
-                break_mn: [0.0, 60.0, 300.0][(3.0 * draw.next()) as usize % 3],
+                break_mn: [0.0, 60.0, 300.0][(3.0 * draw.unit()) as usize % 3],
                 offset: [0.0; 3],
             };
             ties = scene.bed(&bed).unwrap_or_default();
@@ -127,14 +125,14 @@ fn random_loads_together_invert_no_element() {
                 ties.push(tie(&scene, &mut draw, domain, ball, pulled));
             }
         }
-        if draw.next() < 0.05 {
-            gravity = draw.aside(0.5).to_array();
+        if draw.unit() < 0.05 {
+            gravity = aside(&mut draw, 0.5).to_array();
         }
-        ball += (site + draw.aside(3.0) - ball) * 0.1 + draw.aside(0.2);
+        ball += (site + aside(&mut draw, 3.0) - ball) * 0.1 + aside(&mut draw, 0.2);
         lift += draw.within(-0.2, 0.2);
         // The group comes back from time to time, so that it is nowhere far away.
-        led = (Vector::from(led) * 0.98 + draw.aside(LED_MM)).to_array();
-        let_go ^= draw.next() < 0.03;
+        led = (Vector::from(led) * 0.98 + aside(&mut draw, LED_MM)).to_array();
+        let_go ^= draw.unit() < 0.03;
         let groups = [GroupMotion {
             group: 1,
             let_go,

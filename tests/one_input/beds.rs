@@ -9,10 +9,10 @@ use std::ptr::{null, null_mut};
 use upt::ffi::*;
 use upt::{Bed, Contact, Error, Loads, Spring, StepInput, Tie, TieEnd, Vector};
 
-use crate::fixture::{model, plain, scene};
-use crate::host::{Host, message};
 use crate::ties::{hang, middle, place, raw, thorough, thread, with};
 use crate::{BUNDLE, awake, rust};
+use fixture::host::{Host, message};
+use fixture::{model, plain, scene};
 
 /// A bed is one call, whose ties share its stiffness; pulled by its middle the ties there break first, and then farther out.
 #[test]

@@ -5,11 +5,9 @@ use std::sync::Arc;
 use upt::ffi::*;
 use upt::{Contact, GroupMotion, Loads, Model, ModelOptions, Scene, StepInput, SupportPose};
 
-use crate::fixture::{
-    bits, copy_of, find_runtime, manifest, plain, scene, with_groups, write_manifest,
-};
-use crate::host::{Host, message};
 use crate::{BUNDLE, ball, step, tool};
+use fixture::host::{Host, message};
+use fixture::{bits, copy_of, find_runtime, manifest, plain, scene, with_groups, write_manifest};
 
 #[path = "led_between.rs"]
 mod led_between;

@@ -4,9 +4,9 @@ use upt::haptics::{HapticOptions, HapticPose};
 use upt::{Contact, Error, GroupMotion, StepInput, SupportPose, View};
 
 use super::{at, largest, led, moved, nodes, open};
-use crate::fixture::{bits, plain, scene};
-use crate::host::Host;
 use crate::{BUNDLE, ball, tool};
+use fixture::host::Host;
+use fixture::{bits, plain, scene};
 
 const DT: f64 = 0.05;
 

@@ -7,9 +7,9 @@
 use upt::ffi::*;
 use upt::{Contact, Corrections, Error, IndexSet, Loads, Pressure, SceneOptions, StepInput, flag};
 
-use crate::fixture::{bits, model, plain, scene};
-use crate::host::{Host, indices};
 use crate::{BUNDLE, awake, ball, rust, step, submitted, tool};
+use fixture::host::{Host, indices};
+use fixture::{bits, model, plain, scene};
 
 fn largest(u: &[f32]) -> f32 {
     u.iter().fold(0.0, |most, u| most.max(u.abs()))
@@ -184,7 +184,7 @@ fn the_half_that_no_tool_reaches_turns_with_gravity_too() {
         corrections: Corrections::Fixed(2),
         ..plain()
     };
-    let scene = scene(&model("../../onnx/brain-coarse-reduced"), &options);
+    let scene = scene(&model(fixture::shipped("brain-coarse-reduced")), &options);
     let positions = scene.model().positions();
     let mut u = vec![0.0; positions.len()];
     for t in 1..=12 {

@@ -8,11 +8,7 @@
 
 mod all_together;
 mod beds;
-#[path = "../fixture/mod.rs"]
-mod fixture;
 mod groups;
-#[path = "../host/mod.rs"]
-mod host;
 mod loads;
 mod mistakes;
 mod mobilise;
@@ -23,8 +19,8 @@ mod ties;
 
 use std::ptr::{null, null_mut};
 
+use fixture::host::{self, Host, indices, message};
 use fixture::{bits, model, plain, scene};
-use host::{Host, indices, message};
 use upt::contact::Tool;
 use upt::ffi::*;
 use upt::{Contact, Corrections, Scene, SceneOptions, Shape, StepInput, View};

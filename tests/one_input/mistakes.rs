@@ -8,8 +8,8 @@ use std::ptr::null;
 
 use upt::ffi::*;
 
-use crate::host::{self, Host, message};
 use crate::{BUNDLE, awake, ball, frame, state, step};
+use fixture::host::{self, Host, message};
 
 /// What is wrong with an input, how it is made wrong, the status, and the field that the message names.
 type Mistake = (&'static str, fn(&mut upt_input), i32, &'static str);

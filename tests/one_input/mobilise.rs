@@ -12,7 +12,7 @@ use upt::{
     Contact, GroupMotion, Loads, Model, ModelOptions, Scene, SceneOptions, StepInput, SupportPose,
 };
 
-use crate::fixture::{find_runtime, manifest, write_manifest};
+use fixture::{copy_of, find_runtime, manifest, shipped, write_manifest};
 
 const STEPS: u32 = 80;
 const RADIUS: f32 = 8.0;
@@ -20,11 +20,7 @@ const RADIUS: f32 = 8.0;
 /// The liver, whose held nodes are two groups along x; and the second of them.
 fn liver() -> (tempfile::TempDir, Arc<Model>, Vec<u32>) {
     find_runtime();
-    let folder = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir("onnx/liver-coarse").unwrap() {
-        let entry = entry.unwrap();
-        std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
-    }
+    let folder = copy_of(shipped("liver-coarse"));
     let mesh = Mesh::read(&folder.path().join("mesh.safetensors")).unwrap();
     let x = |node: &u32| mesh.positions[*node as usize][0];
     let mut places: Vec<f32> = mesh.fixed.iter().map(x).collect();

@@ -3,9 +3,9 @@
 use upt::ffi::*;
 use upt::{Loads, Model, ModelOptions, Pressure, StepInput};
 
-use crate::fixture::{bits, copy_of, find_runtime, manifest, plain, scene, write_manifest};
-use crate::host::{Host, message};
 use crate::{BUNDLE, step};
+use fixture::host::{Host, message};
+use fixture::{bits, copy_of, find_runtime, manifest, plain, scene, write_manifest};
 
 fn folder(regions: serde_json::Value) -> tempfile::TempDir {
     find_runtime();
@@ -20,7 +20,7 @@ fn folder(regions: serde_json::Value) -> tempfile::TempDir {
 #[test]
 fn a_pressure_acts_on_a_region_that_the_bundle_names() {
     find_runtime();
-    let model = Model::open(&crate::fixture::path(BUNDLE), &ModelOptions::default()).unwrap();
+    let model = Model::open(&fixture::path(BUNDLE), &ModelOptions::default()).unwrap();
     let faces = model.indices(upt::IndexSet::SurfaceFaces).to_vec();
     let (mut bed, mut face) = (faces[..9].to_vec(), faces[..3].to_vec());
     [&mut bed, &mut face].into_iter().for_each(|nodes| {

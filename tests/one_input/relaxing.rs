@@ -10,8 +10,8 @@ use upt::{
 };
 
 use crate::BUNDLE;
-use crate::fixture::{bits, relaxing_in, scene, with_groups};
 use crate::ties::{middle, place, thorough, thread};
+use fixture::{bits, relaxing_in, scene, with_groups};
 
 /// What acts, one at a time.
 const CASES: [&str; 6] = ["gravity", "forces", "pressure", "tie", "group", "tool"];

@@ -3,9 +3,9 @@
 use upt::ffi::*;
 use upt::{Loads, StepInput, SupportPose};
 
-use crate::fixture::{model, plain, scene};
-use crate::host::Host;
 use crate::{BUNDLE, awake, rust, step};
+use fixture::host::Host;
+use fixture::{model, plain, scene};
 
 fn field(bits: &[u32]) -> Vec<f32> {
     bits.iter().map(|bits| f32::from_bits(*bits)).collect()

@@ -10,9 +10,9 @@ use upt::{
     TieReading, Vector,
 };
 
-use crate::fixture::{bits, model, plain, scene};
-use crate::host::{Host, indices, message};
 use crate::{BUNDLE, awake, ball, rust, step, submitted, tool};
+use fixture::host::{Host, indices, message};
+use fixture::{bits, model, plain, scene};
 
 pub fn thorough() -> SceneOptions {
     SceneOptions {

@@ -7,7 +7,7 @@ use std::ptr::{null, null_mut};
 use upt::ffi::*;
 
 use crate::allocator::counted;
-use crate::host;
+use fixture::host;
 
 /// A model, its scene and a hand, and what the host gives them.
 pub struct Rig {

@@ -9,10 +9,6 @@
 mod allocator;
 mod calls;
 mod cuts;
-#[path = "../fixture/mod.rs"]
-mod fixture;
-#[path = "../host/mod.rs"]
-mod host;
 mod scripts;
 
 use std::path::{Path, PathBuf};
@@ -21,6 +17,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use allocator::without;
 use calls::{Call, Rig};
+use fixture::host;
 use scripts::{CORRECTED, CUT, DRIVEN, GROUPS, PLAIN};
 use upt::ffi::*;
 
@@ -131,11 +128,7 @@ fn cases(grouped: &Path) -> Vec<Case> {
         options.substeps = 2;
     });
     let plain = options(|options| options.corrections.mode = UPT_CORRECTIONS_NONE);
-    let brain = |name: &str| {
-        Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("onnx")
-            .join(name)
-    };
+    let brain = fixture::shipped;
     vec![
         (fixture::path("tiny-corrected"), corrected, CORRECTED),
         (fixture::path("tiny-corrected"), corrected, CUT),

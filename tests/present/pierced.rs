@@ -1,7 +1,5 @@
 //! A thin tool in tissue that swings: no frame shows it pierced.
 
-use std::path::Path;
-
 use super::*;
 use contact::{Body, Pose, Rotation, Vector};
 use upt::{Model, ModelOptions};
@@ -72,7 +70,7 @@ fn depth(scene: &Scene, u: &[f32], body: &Body, pose: &Pose) -> f32 {
 /// The tissue about the point swings on after the tool has stopped, and followed for half a step or a whole one it went 1.5 mm into the point.
 #[test]
 fn a_point_in_a_fold_is_shown_outside_of_the_tissue() {
-    let model = Model::open(Path::new("onnx/brain"), &ModelOptions::default()).unwrap();
+    let model = Model::open(&fixture::shipped("brain"), &ModelOptions::default()).unwrap();
     let options = SceneOptions {
         step_s: STEP_S,
         ..SceneOptions::default()

@@ -1,7 +1,5 @@
 //! Sleep, sampling and snapshots; the worker is in `worker.rs`.
 
-#[path = "../fixture/mod.rs"]
-mod fixture;
 mod relaxation;
 mod worker;
 

@@ -1,7 +1,7 @@
 //! Tissue that relaxes, as a scene's host sees it.
 
 use super::FREE;
-use super::fixture::{bits, plain, push, relaxing, scene, sparse};
+use fixture::{bits, plain, push, relaxing, scene, sparse};
 use serde_json::json;
 use std::sync::Arc;
 use upt::{Corrections, IndexSet, Model, Scene, SceneOptions, flag};

@@ -5,7 +5,7 @@ use std::time::Duration;
 use upt::{Contact, Error, Progress, SceneOptions};
 
 use super::FREE;
-use super::fixture::{BUNDLES, bits, model, plain, push, scene, sparse};
+use fixture::{BUNDLES, bits, model, plain, push, scene, sparse};
 
 /// Longer than any machine takes for a step.
 const FOREVER: Duration = Duration::from_secs(86_400);

@@ -1,30 +1,23 @@
 //! Both boundary conditions of a mesh file in `upt make`, and a coarse space that learns from simulated tools (`upt corrections --data`).
 
 use std::path::Path;
-use std::process::Command;
 
-use serde_json::Value;
+use fixture::{manifest, program, said};
 use tissue::mesh::box_phantom;
 
 /// Runs `upt` and returns whether it succeeded, with all that it printed.
 fn upt(arguments: &[&str]) -> (bool, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_upt"))
-        .args(arguments)
+    let output = program(env!("CARGO_BIN_EXE_upt"), arguments)
         .env("ORT_DYLIB_PATH", "/nowhere/libonnxruntime.so")
         .output()
         .unwrap();
-    let both = [output.stdout, output.stderr].concat();
-    (output.status.success(), String::from_utf8(both).unwrap())
+    (output.status.success(), said(&output))
 }
 
 fn done(arguments: &[&str]) -> String {
     let (success, text) = upt(arguments);
     assert!(success, "{arguments:?}: {text}");
     text
-}
-
-fn manifest(bundle: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(bundle.join("bundle.json")).unwrap()).unwrap()
 }
 
 #[test]

@@ -2,37 +2,17 @@
 //!
 //! ONNX Runtime is found by `ORT_DYLIB_PATH`, else in `target/ort/` where `cargo xtask ort` puts it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
+use fixture::{json, program};
 
 fn upt(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_upt"));
-    command.current_dir(root()).args(arguments);
-    if std::env::var_os("ORT_DYLIB_PATH").is_none() {
-        command.env(
-            "ORT_DYLIB_PATH",
-            root().join("target/ort/libonnxruntime.so"),
-        );
-    }
-    command
+    program(env!("CARGO_BIN_EXE_upt"), arguments)
 }
 
 fn run(arguments: &[&str]) -> Output {
     upt(arguments).output().expect("upt starts")
-}
-
-fn json(output: &Output) -> serde_json::Value {
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
-        panic!(
-            "{error}: {}{}",
-            String::from_utf8_lossy(&output.stdout),
-            String::from_utf8_lossy(&output.stderr)
-        )
-    })
 }
 
 #[test]

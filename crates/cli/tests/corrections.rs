@@ -1,35 +1,11 @@
 //! `upt corrections` gives a bundle its coarse space, and the corrected bundle follows the reference solver.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
+use fixture::{copy_of, find_runtime, program, said};
 use tissue::mesh::{Boundary, Mesh};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
-use upt::{Contact, Corrections, InitOptions, Model, ModelOptions, Scene, SceneOptions};
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-fn find_runtime() {
-    let found = std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from);
-    let runtime = found.unwrap_or_else(|| root().join("target/ort/libonnxruntime.so"));
-    let options = InitOptions {
-        threads: 0,
-        onnxruntime_path: Some(runtime),
-    };
-    upt::init(&options).unwrap();
-}
-
-/// A copy of a fixture.
-fn copy_of(name: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(root().join("tests/fixtures").join(name)).unwrap() {
-        let entry = entry.unwrap();
-        std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
-    }
-    folder
-}
+use upt::{Contact, Corrections, Model, ModelOptions, Scene, SceneOptions};
 
 /// A copy of the fixture without corrections.
 fn bundle() -> tempfile::TempDir {
@@ -41,15 +17,10 @@ fn corrected() -> tempfile::TempDir {
 }
 
 fn upt(arguments: &[&str]) -> (bool, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_upt"))
-        .args(arguments)
+    let output = program(env!("CARGO_BIN_EXE_upt"), arguments)
         .output()
         .unwrap();
-    let text = [output.stdout, output.stderr].concat();
-    (
-        output.status.success(),
-        String::from_utf8_lossy(&text).into_owned(),
-    )
+    (output.status.success(), said(&output))
 }
 
 /// Mean squared error against the solver over a slow push that is held, mm².

@@ -2,21 +2,16 @@
 //! `training/tests/test_vtk_export.py`.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
+use fixture::{program, root};
 use tissue::mesh::Mesh;
 use tissue::trajectory::Trajectory;
 
 const MESH: &str = "tests/fixtures/box.mesh.safetensors";
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
 fn upt(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_upt"))
-        .current_dir(root())
-        .args(arguments)
+    program(env!("CARGO_BIN_EXE_upt"), arguments)
         .output()
         .unwrap()
 }

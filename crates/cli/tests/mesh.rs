@@ -1,15 +1,12 @@
 //! `upt mesh` as a user calls it.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::Output;
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
+use fixture::{program, root};
 
 fn upt(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_upt"))
-        .args(arguments)
+    program(env!("CARGO_BIN_EXE_upt"), arguments)
         .output()
         .unwrap()
 }

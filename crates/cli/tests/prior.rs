@@ -2,14 +2,12 @@
 #![cfg(feature = "linear")]
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 const BATCH: usize = 12;
 
 fn run(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_upt"))
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
-        .args(arguments)
+    fixture::program(env!("CARGO_BIN_EXE_upt"), arguments)
         .output()
         .expect("upt starts")
 }

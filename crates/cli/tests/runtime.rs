@@ -4,11 +4,8 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use fixture::{copy_into, root, runtime_path, shipped};
 use ort_wheel::{Platform, VERSION};
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
 
 /// A copy of the command that lies in no build folder, with a cache of its own.
 struct Installed {
@@ -57,13 +54,6 @@ impl Installed {
     }
 }
 
-/// The library that the tests use.
-fn library() -> PathBuf {
-    let named = std::env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty());
-    let of_the_build = root().join("target/ort").join(host().library());
-    named.map_or(of_the_build, PathBuf::from)
-}
-
 fn host() -> Platform {
     Platform::host().expect("tests run where a wheel is known")
 }
@@ -73,7 +63,7 @@ fn a_library_that_was_fetched_is_taken_and_not_fetched_again() {
     let upt = Installed::new();
     std::fs::create_dir_all(upt.kept()).unwrap();
     let kept = upt.kept().join(host().library());
-    std::fs::copy(library(), &kept).unwrap();
+    std::fs::copy(runtime_path(), &kept).unwrap();
     std::fs::write(upt.kept().join("version.txt"), VERSION).unwrap();
 
     let ran = upt.run(&["doctor", "--json", "tests/fixtures/tiny-upt"], "");
@@ -163,11 +153,7 @@ fn doctor_asks_for_a_library_only_where_a_bundle_needs_it() {
 fn doctor_finds_the_bundles_of_its_archive() {
     let upt = Installed::new();
     let bundles = upt.folder.path().join("share/upt/bundles/liver");
-    std::fs::create_dir_all(&bundles).unwrap();
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../onnx/liver-coarse");
-    for entry in std::fs::read_dir(source).unwrap().flatten() {
-        std::fs::copy(entry.path(), bundles.join(entry.file_name())).unwrap();
-    }
+    copy_into(&bundles, shipped("liver-coarse"));
     let elsewhere = tempfile::tempdir().unwrap();
     let ran = upt.run_in(elsewhere.path(), &["doctor"], "");
     let said = String::from_utf8(ran.stdout).unwrap();

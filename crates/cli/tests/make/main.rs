@@ -8,8 +8,9 @@ mod relaxing;
 mod short_time;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
+use fixture::said as text;
 use upt::{Contact, Model, ModelOptions, Scene, SceneOptions, StepInput};
 
 /// An ellipsoid with half axes 50, 40 and 30 mm as an OBJ, with `bend` applied to each point.
@@ -81,11 +82,6 @@ fn command(surface: &Path, out: &Path, more: &[&str]) -> Command {
 }
 
 const HELD: [&str; 2] = ["--fixed", "plane:0,0,-1,-20"];
-
-fn text(output: &Output) -> String {
-    let both = [output.stdout.as_slice(), &output.stderr].concat();
-    String::from_utf8_lossy(&both).into_owned()
-}
 
 /// Whether the folder holds a bundle whose tissue follows a push.
 fn works(bundle: &Path) {

@@ -5,9 +5,10 @@ mod recorded;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use fixture::{said, shipped};
+
 fn upt(file: &Path, more: &[&str], isa: Option<&str>) -> Output {
-    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../onnx/liver-coarse");
-    of(&bundle, file, more, isa)
+    of(&shipped("liver-coarse"), file, more, isa)
 }
 
 fn of(bundle: &Path, file: &Path, more: &[&str], isa: Option<&str>) -> Output {
@@ -53,11 +54,6 @@ fn inputs() -> String {
         }
     }
     text + "\n{\"end\":7}\n"
-}
-
-fn said(output: &Output) -> String {
-    let [out, err] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
-    format!("{out}{err}")
 }
 
 /// Verifies REQ-095.

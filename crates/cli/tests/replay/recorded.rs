@@ -1,6 +1,5 @@
 //! What a scene records of all that it can be given comes out to the bit in another process, also with other instructions.
 
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,26 +9,12 @@ use upt::{
     TiePoint, Tool, Vector,
 };
 
-use super::{of, said};
+use super::of;
+use fixture::{said, shipped, with_groups};
 
 /// The liver that ships, its held nodes in two support groups.
-fn with_groups() -> (tempfile::TempDir, Arc<Model>) {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../onnx/liver-coarse");
-    let folder = tempfile::tempdir().unwrap();
-    for entry in std::fs::read_dir(&source).unwrap() {
-        let entry = entry.unwrap();
-        std::fs::copy(entry.path(), folder.path().join(entry.file_name())).unwrap();
-    }
-    let intact = Model::open(&source, &ModelOptions::default()).unwrap();
-    let held = intact.indices(IndexSet::HeldNodes);
-    let (left, right) = held.split_at(held.len() / 2);
-    let place = folder.path().join("bundle.json");
-    let mut manifest: serde_json::Value =
-        serde_json::from_slice(&std::fs::read(&place).unwrap()).unwrap();
-    manifest["supports"] =
-        serde_json::json!([{"name": "left", "nodes": left}, {"name": "right", "nodes": right}]);
-    manifest.as_object_mut().unwrap().remove("manifest_sha256");
-    std::fs::write(place, manifest.to_string()).unwrap();
+fn grouped() -> (tempfile::TempDir, Arc<Model>) {
+    let folder = with_groups(shipped("liver-coarse"));
     let options = ModelOptions {
         portable: true,
         ..ModelOptions::default()
@@ -306,7 +291,7 @@ fn operated(scene: &Scene) {
 /// Verifies REQ-095, REQ-097.
 #[test]
 fn all_that_a_scene_is_given_is_replayed_to_the_bit() {
-    let (folder, model) = with_groups();
+    let (folder, model) = grouped();
     let options = SceneOptions {
         corrections: Corrections::Fixed(3),
         step_s: 1.0 / 30.0,

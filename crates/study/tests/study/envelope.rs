@@ -1,19 +1,8 @@
 //! `envelope`: limits of tools from simulated cases, into the manifest; what is refused leaves the bundle alone.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::{MESH, root, study, told};
-
-/// A copy of a fixture.
-fn copy_of(name: &str, folder: &Path) -> PathBuf {
-    let to = folder.join(name);
-    std::fs::create_dir(&to).unwrap();
-    for entry in std::fs::read_dir(root().join("tests/fixtures").join(name)).unwrap() {
-        let entry = entry.unwrap();
-        std::fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
-    }
-    to
-}
+use crate::{MESH, study, told};
 
 fn simulate(folder: &Path, programme: &str) -> String {
     crate::simulate(folder, MESH, &["--tool", programme])
@@ -23,7 +12,8 @@ fn simulate(folder: &Path, programme: &str) -> String {
 fn limits_of_tools_are_measured_and_written() {
     let folder = tempfile::tempdir().unwrap();
     let [press, two] = ["press", "two"].map(|programme| simulate(folder.path(), programme));
-    let bundle = copy_of("tiny-corrected", folder.path());
+    let bundle = folder.path().join("tiny-corrected");
+    fixture::copy_into(&bundle, "tiny-corrected");
     let manifest = || std::fs::read(bundle.join("bundle.json")).unwrap();
     let before = manifest();
     let name = bundle.to_str().unwrap();

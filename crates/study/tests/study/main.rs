@@ -6,23 +6,16 @@ mod report;
 mod stress;
 mod tools;
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::Output;
+
+use fixture::program;
 
 const MESH: &str = "tests/fixtures/box.mesh.safetensors";
 
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
 /// Runs the command in the repository's root.
 fn study(arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_upt-study"));
-    command.current_dir(root()).args(arguments);
-    if std::env::var_os("ORT_DYLIB_PATH").is_none() {
-        let library = root().join("target/ort/libonnxruntime.so");
-        command.env("ORT_DYLIB_PATH", library);
-    }
+    let mut command = program(env!("CARGO_BIN_EXE_upt-study"), arguments);
     command.output().expect("upt-study starts")
 }
 
@@ -34,7 +27,7 @@ fn told(output: &Output) -> String {
 fn json(arguments: &[&str]) -> serde_json::Value {
     let output = study(arguments);
     assert!(output.status.success(), "{}", told(&output));
-    serde_json::from_slice(&output.stdout).expect("it prints JSON")
+    fixture::json(&output)
 }
 
 /// Simulates a load on a mesh, such as `--tool press`.
