@@ -3,6 +3,7 @@
     python tests/docs/results.py run NAME -- COMMAND ... {page}  # run a command that writes tables, and keep them
     python tests/docs/results.py show                            # the pages' tables from the data
     python tests/docs/results.py ages                            # which figures are older than the code they measure
+    python tests/docs/results.py narrow NAME --measures PATH ... # what measurements measure, where they name too much
 
 Commands write Markdown between marks of their own. `run` gives them a page with the marks and tables of data/NAME.json
 (`{page}` is its path, target/results/NAME.md), and keeps what the command wrote, with the command, machine, date and
@@ -38,7 +39,18 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs/results"
 DATA = PAGES / "data"
 MARK = re.compile(r"^<!-- results: (?P<what>.*?) -->\n(?:(?!<!--).+\n)*", re.MULTILINE)
-MEASURED = ("src", "crates", "onnx")
+#: What a step is made of.
+LIBRARY = (
+    "src",
+    *(
+        f"crates/{name}"
+        for name in """
+    bundle contact elements exchange field held implicit kernels lanes prior topology
+""".split()
+    ),
+)
+#: And what drives it beside the solver.
+MEASURED = (*LIBRARY, "crates/host", "crates/tissue", "crates/yardstick", "onnx")
 #: Behind what a command finds between its marks: where it is gone, the command has measured anew, the same figures too.
 UNTOUCHED = "<!-- as it was -->\n"
 
@@ -162,6 +174,18 @@ def run(options: argparse.Namespace) -> None:
     write(options.name, blocks)
 
 
+def narrow(options: argparse.Namespace) -> None:
+    """Names the code of measurements anew; its hashes are those of the commit that they were made at."""
+    blocks = read(options.name)
+    for number in options.numbers or range(1, len(blocks) + 1):
+        block = blocks[number - 1]
+        if not git("rev-parse", "--verify", "--quiet", f"{block['commit']}^{{commit}}"):
+            sys.exit(f"{options.name} {number}: commit {block['commit']} is not here; measure anew with `run`")
+        block["measures"] = options.measures
+        block["inputs"] = {path: code_hash.of(path, block["commit"]) for path in options.measures}
+    write(options.name, blocks)
+
+
 def markdown(what: str) -> str:
     """The lines of a mark."""
     source, columns, condition = ([part.strip() for part in re.split(r"\s\|(?=\s)", what)] + ["", ""])[:3]
@@ -271,14 +295,23 @@ def main() -> int:
     running.add_argument("--mark", nargs=2, action="append", help="begin and end of a new block")
     running.add_argument("--measures", nargs="+", default=list(MEASURED), help="paths of the code that is measured")
     running.add_argument("command", nargs="+")
+    narrowing = commands.add_parser("narrow", help="name the code that was measured anew")
+    narrowing.add_argument("name")
+    narrowing.add_argument("numbers", nargs="*", type=int, help="blocks, from 1; all where none is named")
+    narrowing.add_argument("--measures", nargs="+", required=True, help="paths, or `library`")
     commands.add_parser("show", help="write the pages' tables")
     commands.add_parser("ages", help="tell which figures are older than their code")
     options = parser.parse_args()
+    if hasattr(options, "measures"):
+        expanded = [LIBRARY if path == "library" else [path] for path in options.measures]
+        options.measures = [path for paths in expanded for path in paths]
     if options.what == "ages":
         print("\n".join(ages()))
         return 0
     if options.what == "run":
         run(options)
+    if options.what == "narrow":
+        narrow(options)
     said: list[str] = []
     for page in pages():
         text = shown(page, said)
