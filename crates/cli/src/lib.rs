@@ -28,11 +28,9 @@ pub mod mesh;
 #[cfg(feature = "linear")]
 pub mod modes;
 pub mod one_of;
-pub mod plot;
 #[cfg(feature = "linear")]
 pub mod prior;
 pub mod progress;
-pub mod render;
 pub mod replay;
 pub mod rollout;
 pub mod runtime;

@@ -15,7 +15,7 @@ use yardstick::setting::{Precision, Provider, Region};
 use yardstick::surrogate::{self, Surrogate};
 
 use crate::one_of::one_of;
-use crate::render::{Image, Palette, contact_camera, deformed, lengths};
+use picture::render::{Image, Palette, contact_camera, deformed, lengths};
 
 #[derive(Args)]
 #[command(after_help = "Examples:

@@ -18,11 +18,11 @@ impl Publisher<'_> {
     /// A part of the report, Markdown: printed, and in each page between the marks of this name.
     pub fn part(&self, mark: &str, text: &str) -> Result<()> {
         self.say(text);
-        self.into_pages(mark, text)
+        self.write_pages(mark, text)
     }
 
     /// In pages alone.
-    pub fn into_pages(&self, mark: &str, text: &str) -> Result<()> {
+    pub fn write_pages(&self, mark: &str, text: &str) -> Result<()> {
         let write = |page: &PathBuf| replace_between(page, mark, &format!("\n{text}"));
         self.pages.iter().try_for_each(write)
     }

@@ -4,7 +4,7 @@ use elements::Ogden;
 
 use super::curve::{Curve, Mode, nominal_stress};
 use super::hold::{Hold, Terms};
-use crate::plot::{Axes, Scale, colour};
+use picture::plot::{Axes, Scale, colour};
 
 /// Points of a drawn curve.
 const STEPS: usize = 120;

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use super::observer::{Moment, Series};
-use upt_cli::plot::{Axes, Scale, colour};
+use picture::plot::{Axes, Scale, colour};
 
 /// Below this a value is drawn at the bottom of a logarithmic axis.
 const FLOOR: f64 = 1e-5;

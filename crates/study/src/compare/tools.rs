@@ -13,7 +13,7 @@ use tissue::solver::Solver;
 
 use crate::bench::{Bench, names};
 use crate::table::{Column, Table};
-use upt_cli::plot::label;
+use picture::plot::label;
 use upt_cli::progress;
 use yardstick::drive::{Drive, Driver};
 use yardstick::yard::Yard;

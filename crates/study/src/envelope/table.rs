@@ -6,8 +6,8 @@ use super::limits::{Limits, Tried};
 use crate::table::{Table, or_dash};
 use gauge::{Sorted, median};
 use host::Effort;
+use picture::plot::label;
 use upt_cli::counted::counted;
-use upt_cli::plot::label;
 
 /// A range of one quantity.
 type Part = (&'static str, fn(&Tried) -> bool);

@@ -8,7 +8,7 @@ use super::play::Track;
 use super::truth::{FRAME_S, Forces, resample};
 use crate::table::{Column, Table};
 use gauge::Resident;
-use upt_cli::plot::{Axes, Scale, colour};
+use picture::plot::{Axes, Scale, colour};
 
 /// Samples of a mean, ms.
 const MEAN: usize = 11;

@@ -8,7 +8,7 @@ use super::plot::{self, Band, Latencies, Point, Stages};
 use super::row::{Measurement, Row};
 use super::table::COLUMNS;
 use host::Effort;
-use upt_cli::plot::{colour, escape};
+use picture::plot::{colour, escape};
 
 /// Facts above the figures: name and value.
 pub type Facts = Vec<(String, String)>;

@@ -6,8 +6,8 @@ use tissue::mesh::Mesh;
 use super::cases::Case;
 use super::html::{Gallery, Picture};
 use super::row::Measurement;
-use upt_cli::plot::{escape, label};
-use upt_cli::render::{Camera, Palette, contact_camera, deformed, lengths};
+use picture::plot::{escape, label};
+use picture::render::{Camera, Palette, contact_camera, deformed, lengths};
 
 const WIDTH: usize = 640;
 const HEIGHT: usize = 460;

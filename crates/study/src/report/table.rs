@@ -2,7 +2,7 @@
 
 use super::row::Row;
 use crate::table::{Column, Table, or_dash};
-use upt_cli::plot::label;
+use picture::plot::label;
 
 /// Column titles and the cell of a row.
 pub const COLUMNS: &[Column<Row>] = &[

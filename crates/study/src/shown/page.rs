@@ -12,7 +12,7 @@ use super::timing::Time;
 use super::truth::Truth;
 use crate::table::{Column, Table};
 use crate::tools::section;
-use upt_cli::plot::{Axes, Scale, label};
+use picture::plot::{Axes, Scale, label};
 use yardstick::cases::{ToolCase, ToolCases};
 
 const COLOURS: [&str; 3] = ["#c2553f", "#b08a2e", "#8fb3d3"];

@@ -68,7 +68,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         pages: options.markdown.as_slice(),
     };
     publisher.say(&Table::of(&[0, 1, 2, 3], &columns, &rows).text());
-    publisher.into_pages("study stress", &markdown(&rows))?;
+    publisher.write_pages("study stress", &markdown(&rows))?;
     if let Some(path) = &options.json {
         publish::file(path, &rows)?;
     }

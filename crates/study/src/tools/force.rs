@@ -1,7 +1,7 @@
 //! Force over time at each tool: the truth, and each way of driving the library.
 
 use super::section::TRUTH;
-use upt_cli::plot::{Axes, Scale, escape};
+use picture::plot::{Axes, Scale, escape};
 use yardstick::cases::ToolCase;
 use yardstick::drive::Felt;
 use yardstick::measure::{Outcome, Truth};

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::report::html::{Facts, VIEWER_STYLE, closing, inline, opening, playing, section};
-use upt_cli::plot::{escape, legend};
+use picture::plot::{escape, legend};
 
 use super::row::{ALL, Row};
 use super::section::{REST, TOOL, TRUTH};

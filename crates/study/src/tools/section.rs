@@ -5,7 +5,7 @@ use std::fmt::Write;
 use contact::{Body, Pose, Vector};
 use tissue::mesh::Mesh;
 
-use upt_cli::plot::escape;
+use picture::plot::escape;
 use yardstick::cases::ToolCase;
 
 /// Half the width and half the height of the picture, mm.

@@ -2,7 +2,7 @@
 
 use super::row::{ALL, Row};
 use crate::table::{Column, Table, or_dash};
-use upt_cli::plot::label;
+use picture::plot::label;
 
 /// Column titles and cells; the first three name the row.
 pub const COLUMNS: &[Column<Row>] = &[

@@ -13,9 +13,9 @@ use crate::posed::Posed;
 use crate::publish;
 use crate::report::options::Options;
 use crate::table::Table;
+use picture::plot::colour;
 use upt_cli::counted::counted;
 use upt_cli::marks::replace_between;
-use upt_cli::plot::colour;
 use yardstick::cases::ToolCases;
 use yardstick::drive::Drive;
 use yardstick::measure::{Outcome, Truth};
@@ -39,7 +39,7 @@ fn pictures(
         let each = all.iter().enumerate().map(|(at, one)| {
             let outcome = &one.outcomes[index];
             let mse = outcome.moments[frame - 1].mse_mm2;
-            let name = format!("{}: MSE {} mm²", one.name, upt_cli::plot::label(mse));
+            let name = format!("{}: MSE {} mm²", one.name, picture::plot::label(mse));
             section::picture(mesh, case, frame, &outcome.pictured, &name, colour(at))
         });
         let lines: Vec<(&Outcome, &str)> = all

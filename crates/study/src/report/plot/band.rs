@@ -1,7 +1,7 @@
 //! Error over time: the mean over the cases and the band from the best to the worst case.
 
-use upt_cli::plot::colour;
-use upt_cli::plot::{Axes, Scale, legend};
+use picture::plot::colour;
+use picture::plot::{Axes, Scale, legend};
 
 /// One method's error at each step.
 pub struct Band {

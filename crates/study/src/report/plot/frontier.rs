@@ -1,11 +1,11 @@
 //! The frontier: error against run time, both logarithmic, with the Pareto front drawn.
 
 use host::Effort;
-use upt_cli::plot::{Axes, Scale, label, legend};
+use picture::plot::{Axes, Scale, label, legend};
 
 /// Below this an error is round-off of the reference itself, mm².
 const EXACT: f64 = 1e-7;
-use upt_cli::plot::colour;
+use picture::plot::colour;
 
 /// One row of the report in the plane of time and error.
 pub struct Point {

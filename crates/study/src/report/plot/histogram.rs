@@ -1,7 +1,7 @@
 //! The distribution of step times, one curve a method over logarithmic bins.
 
-use upt_cli::plot::colour;
-use upt_cli::plot::{Axes, Scale, legend};
+use picture::plot::colour;
+use picture::plot::{Axes, Scale, legend};
 
 /// Times of single steps, ms.
 pub struct Latencies {

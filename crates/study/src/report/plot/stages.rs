@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use upt_cli::plot::{colour, escape};
-use upt_cli::plot::{label, legend};
+use picture::plot::{colour, escape};
+use picture::plot::{label, legend};
 
 /// Mean time of each stage of one configuration, ms.
 pub struct Stages {
