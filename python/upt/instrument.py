@@ -27,7 +27,7 @@ class Hull:
 
     Raises:
         upt.ArgumentError: points that are not finite, too few, too many or without a volume; a surface that is not
-            closed or has a wall of less than 0.2 mm.
+            closed, crosses itself, has a part inside out or a wall of less than 0.2 mm.
     """
 
     def __init__(self, points: ArrayLike, faces: ArrayLike | None = None) -> None:

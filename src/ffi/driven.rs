@@ -101,8 +101,8 @@ pub unsafe extern "C" fn upt_scene_read_instrument_contacts(
 /// - `out`: the new hull.
 ///
 /// Threads: any.
-/// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume, and for a surface that is not closed
-/// or has a wall of less than 0.2 mm,
+/// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume, and for a surface that is not closed,
+/// crosses itself, has a part inside out or a wall of less than 0.2 mm,
 /// `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_OUT_OF_MEMORY`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_hull_create(

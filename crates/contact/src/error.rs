@@ -21,6 +21,14 @@ pub enum ShapeError {
         "the surface is not closed: the edge from point {a} to {b} does not belong to one face on each side; give a watertight surface, or take its hull"
     )]
     Open { a: u32, b: u32 },
+    #[error(
+        "the surface crosses or touches itself at [{}, {}, {}] mm, so that its inside is not known; unite its parts (a Boolean union) or take its hull", .at[0], .at[1], .at[2]
+    )]
+    Crossing { at: [f32; 3] },
+    #[error(
+        "a part of the surface is inside out at [{}, {}, {}] mm: turn the faces of that part, outward or around a hollow inward", .at[0], .at[1], .at[2]
+    )]
+    InsideOut { at: [f32; 3] },
     #[error("the {count} points of the tool have no volume ({reason}); give a solid tool")]
     Flat { count: usize, reason: String },
     #[error(

@@ -3,12 +3,14 @@
 use crate::error::ShapeError;
 use parry3d::math::Vector;
 use parry3d::query::{PointQueryWithLocation, Ray, RayCast};
-use parry3d::shape::{TriMesh, TriMeshFlags};
+use parry3d::shape::{CompositeShapeRef, TriMesh, TriMeshFlags};
 use parry3d::transformation::try_convex_hull;
 use std::collections::HashMap;
 
 /// Below this the direction to the nearest point is rounding, and the triangle's normal is taken, mm.
 const CLOSE: f32 = 1e-4;
+/// Faces of less than this share of the surface may be slivers, whose normal is rounding.
+const NO_FACE: f32 = 1e-3;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Triangles {
@@ -26,7 +28,7 @@ impl Triangles {
         Self::new(vertices, faces)
     }
 
-    /// A closed surface, turned outward where it is inside out.
+    /// A closed surface, turned outward where it is inside out. Several closed parts may be in it, or hollows, if none crosses another.
     pub fn surface(points: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<Self, ShapeError> {
         let count = points.len();
         let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
@@ -45,7 +47,64 @@ impl Triangles {
             return Err(ShapeError::Open { a: *a, b: *b });
         }
         let vertices = points.iter().map(|p| Vector::from(*p)).collect();
-        Self::new(vertices, faces.to_vec())
+        let surface = Self::new(vertices, faces.to_vec())?;
+        surface.check_inside()?;
+        Ok(surface)
+    }
+
+    /// What is inside must be the same to each face: no edge pierces a face, and behind each face one leaves through the inside of another.
+    /// The sign of the distance is that of the nearest face alone.
+    fn check_inside(&self) -> Result<(), ShapeError> {
+        let (corners, indices) = (self.faces.vertices(), self.faces.indices());
+        for face in indices {
+            for k in 0..3 {
+                let (a, b) = (face[k], face[(k + 1) % 3]);
+                let from = corners[a as usize];
+                let ray = Ray::new(from, corners[b as usize] - from);
+                // Each edge once: its other face has it the other way round.
+                let pierced = (a < b).then(|| {
+                    self.faces.bvh().cast_ray(&ray, 1.0, |other, best| {
+                        let meets = indices[other as usize].iter().any(|n| *n == a || *n == b);
+                        (!meets).then(|| {
+                            let triangle = self.faces.triangle(other);
+                            triangle.cast_local_ray(&ray, best, false)
+                        })?
+                    })
+                });
+                if let Some(Some((_, t))) = pierced
+                    && t <= 1.0
+                {
+                    let at = (from + t * ray.dir).to_array();
+                    return Err(ShapeError::Crossing { at });
+                }
+            }
+        }
+        let (mut astray, mut area) = (None, [0.0; 2]);
+        for face in self.faces.triangles() {
+            let Some(normal) = face.normal() else {
+                continue;
+            };
+            area[0] += face.area();
+            // A ray may slip through between two faces: one of several must not.
+            let ways = [[4.0, 4.0, 4.0], [5.0, 4.0, 3.0], [3.1, 4.2, 4.7]];
+            let leaves = |[a, b, c]: [f32; 3]| {
+                let start = (a * face.a + b * face.b + c * face.c) / 12.0;
+                let ray = Ray::new(start - CLOSE * normal, -normal);
+                let hit = CompositeShapeRef(&self.faces).cast_local_ray(&ray, f32::MAX, false);
+                let other = hit.and_then(|(other, _)| self.faces.triangle(other).normal());
+                other.is_some_and(|other| other.dot(normal) < 0.0)
+            };
+            if !ways.into_iter().any(leaves) {
+                area[1] += face.area();
+                astray = astray.or(Some(face.a));
+            }
+        }
+        match astray {
+            Some(at) if area[1] > NO_FACE * area[0] => {
+                Err(ShapeError::InsideOut { at: at.to_array() })
+            }
+            _ => Ok(()),
+        }
     }
 
     fn new(vertices: Vec<Vector>, mut faces: Vec<[u32; 3]>) -> Result<Self, ShapeError> {

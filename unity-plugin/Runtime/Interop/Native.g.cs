@@ -1537,8 +1537,8 @@ namespace Upt.Interop
         /// - `out`: the new hull.
         ///
         /// Threads: any.
-        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume, and for a surface that is not closed
-        /// or has a wall of less than 0.2 mm,
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_ARGUMENT` for points that are not finite, too many, or without volume, and for a surface that is not closed,
+        /// crosses itself, has a part inside out or a wall of less than 0.2 mm,
         /// `UPT_ERR_UNSUPPORTED` in a build without feature "instruments", `UPT_ERR_OUT_OF_MEMORY`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]

@@ -1,5 +1,7 @@
 //! Distances and normals of every shape, against each other and against closed forms.
 
+mod surfaces;
+
 use contact::{Body, Shape, ShapeError, Vector};
 
 /// Points from a fixed generator, in a cube of half size `half`.
@@ -98,120 +100,6 @@ fn a_hull_of_a_boxs_corners_is_the_box() {
             assert!(a.normal.dot(b.normal) > 0.999, "{p}: {a:?} {b:?}");
         }
     }
-}
-
-/// An L of two bars, 4 mm thick: closed, not convex.
-fn angle() -> Shape {
-    let outline = [
-        [0.0, 0.0],
-        [10.0, 0.0],
-        [10.0, 3.0],
-        [3.0, 3.0],
-        [3.0, 8.0],
-        [0.0, 8.0],
-    ];
-    let points = [-2.0, 2.0].map(|z| outline.map(|[x, y]| [x, y, z]));
-    let cap = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
-    let mut faces: Vec<[u32; 3]> = cap.map(|[a, b, c]| [a, c, b]).to_vec();
-    faces.extend(cap.map(|face| face.map(|n| n + 6)));
-    for a in 0..6u32 {
-        let b = (a + 1) % 6;
-        faces.extend([[a, b, b + 6], [a, b + 6, a + 6]]);
-    }
-    Shape::Mesh {
-        points: points.as_flattened().to_vec(),
-        faces,
-        margin: 0.0,
-    }
-}
-
-#[test]
-fn a_surface_that_is_not_convex_keeps_its_hollow() {
-    let shape = angle();
-    let body = Body::new(&shape).unwrap();
-    let bar = |half: [f32; 3]| Body::new(&Shape::Box { half_extents: half }).unwrap();
-    let (flat, upright) = (bar([5.0, 1.5, 2.0]), bar([1.5, 4.0, 2.0]));
-    for p in points(3000, 12.0) {
-        let found = body.nearest(p);
-        let bars = [
-            flat.nearest(p - Vector::new(5.0, 1.5, 0.0)).distance,
-            upright.nearest(p - Vector::new(1.5, 4.0, 0.0)).distance,
-        ];
-        let expected = bars[0].min(bars[1]);
-        // Outside the nearer bar decides; inside the way out may lead into the other.
-        if expected > 1e-3 {
-            assert!(
-                (found.distance - expected).abs() < 1e-3,
-                "{p}: {found:?} {expected}"
-            );
-        } else if expected < -1e-3 {
-            assert!(
-                found.distance <= expected + 1e-3,
-                "{p}: {found:?} {expected}"
-            );
-        }
-    }
-    // In the hollow, where its hull would be touched.
-    assert!(body.nearest(Vector::new(5.0, 5.0, 0.0)).distance > 1.9);
-    // Its arms are 3 mm thick, and no probe lies in the hollow, as the middle of the box around it does.
-    assert!((body.size() - 1.5).abs() < 1e-3, "{}", body.size());
-    assert!(body.is_broad());
-    assert!(body.probes().count() > 10);
-    for probe in body.probes() {
-        assert!(body.nearest(probe).distance < -1e-3, "{probe}");
-    }
-    let Shape::Mesh { mut points, .. } = angle() else {
-        panic!("a mesh");
-    };
-    for p in &mut points {
-        p[2] *= 0.04;
-    }
-    let thin = Shape::Mesh {
-        points,
-        faces: match angle() {
-            Shape::Mesh { faces, .. } => faces,
-            _ => panic!("a mesh"),
-        },
-        margin: 0.0,
-    };
-    assert!(matches!(
-        Body::new(&thin).unwrap_err(),
-        ShapeError::Wall { .. }
-    ));
-    let Shape::Mesh {
-        points,
-        mut faces,
-        margin,
-    } = shape
-    else {
-        panic!("a mesh");
-    };
-    // Inside out is turned.
-    faces.iter_mut().for_each(|face| face.swap(0, 1));
-    let mesh = |faces: &[[u32; 3]]| {
-        Body::new(&Shape::Mesh {
-            points: points.clone(),
-            faces: faces.to_vec(),
-            margin,
-        })
-    };
-    assert!(
-        mesh(&faces)
-            .unwrap()
-            .nearest(Vector::new(1.0, 1.0, 0.0))
-            .distance
-            < 0.0
-    );
-    faces.pop();
-    assert!(matches!(mesh(&faces).unwrap_err(), ShapeError::Open { .. }));
-    let beyond = mesh(&[[0, 1, 99]]).unwrap_err();
-    assert_eq!(
-        beyond,
-        ShapeError::Face {
-            index: 0,
-            count: 12
-        }
-    );
 }
 
 #[test]
