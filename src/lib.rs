@@ -96,4 +96,4 @@ pub use scene::{
     Bed, Blade, Contact, Cut, CutSurface, GroupMotion, Loads, MAX_PRESSURES, MAX_SUPPORTS,
     Pressure, Progress, Scene, StepInput, SupportPose, SurfaceUpdate, View,
 };
-pub use stats::{SceneStats, flag};
+pub use stats::{SceneStats, SceneTiming, flag};

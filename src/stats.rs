@@ -1,4 +1,4 @@
-//! What a scene reports about its last step: stage times, flags, what ran where.
+//! What a scene reports about its last step: flags, what ran where, and apart from them the times of its stages.
 
 use crate::options::{DecoderKernel, Precision, Provider, StepPath};
 
@@ -85,26 +85,6 @@ pub struct SceneStats {
     pub flags: u32,
     /// Steps since creation or reset.
     pub step_count: u64,
-    /// Wall time of the whole step, ms; the stages follow.
-    pub step_ms: f64,
-    /// Input checks.
-    pub check_ms: f64,
-    /// Contact solve and linear response.
-    pub prior_ms: f64,
-    /// Node features and encoder half.
-    pub encode_ms: f64,
-    /// Mean over the radius graph.
-    pub aggregate_ms: f64,
-    /// `latent.onnx`, or `step.onnx` on the whole path.
-    pub latent_ms: f64,
-    /// Decoder or table products.
-    pub decode_ms: f64,
-    /// Guard.
-    pub guard_ms: f64,
-    /// Corrections by the elements.
-    pub corrections_ms: f64,
-    /// Solves of the contact of instruments, part of the corrections' or the check's time.
-    pub contact_ms: f64,
     /// Corrections made.
     pub corrections: u32,
     /// Evaluations of the element forces.
@@ -133,10 +113,6 @@ pub struct SceneStats {
     pub precision: Precision,
     /// Who makes a step: [`StepPath::Split`] or [`StepPath::Whole`].
     pub step_path: StepPath,
-    /// Of the stages' times, copies to a device; 0 on the CPU.
-    pub upload_ms: f64,
-    /// Of the stages' times, copies back from a device; 0 on the CPU.
-    pub download_ms: f64,
     /// Largest displacement of the last state, mm.
     pub max_displacement_mm: f32,
     /// Largest ratio of push, rate, contact area and number of sites to what the model was trained on; above 1 is outside.
@@ -147,4 +123,37 @@ pub struct SceneStats {
     pub sleeping: bool,
     /// A panic was caught in the scene; only dropping it is allowed.
     pub poisoned: bool,
+    /// Given out by [`crate::Scene::timing`] alone.
+    pub(crate) timing: SceneTiming,
+}
+
+/// How long a scene's last step and its stages took: [`crate::Scene::timing`].
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SceneTiming {
+    /// Steps since creation or reset: the step that this is about.
+    pub step_count: u64,
+    /// Wall time of the whole step, ms; the stages follow.
+    pub step_ms: f64,
+    /// Input checks.
+    pub check_ms: f64,
+    /// Contact solve and linear response.
+    pub prior_ms: f64,
+    /// Node features and encoder half.
+    pub encode_ms: f64,
+    /// Mean over the radius graph.
+    pub aggregate_ms: f64,
+    /// `latent.onnx`, or `step.onnx` on the whole path.
+    pub latent_ms: f64,
+    /// Decoder or table products.
+    pub decode_ms: f64,
+    /// Guard.
+    pub guard_ms: f64,
+    /// Corrections by the elements.
+    pub corrections_ms: f64,
+    /// Solves of the contact of instruments, part of the corrections' or the check's time.
+    pub contact_ms: f64,
+    /// Of the stages' times, copies to a device; 0 on the CPU.
+    pub upload_ms: f64,
+    /// Of the stages' times, copies back from a device; 0 on the CPU.
+    pub download_ms: f64,
 }

@@ -113,11 +113,11 @@ fn take(model: &Arc<Model>, way: &[Tool], k: u32, threads: usize) -> upt::Result
             Some(&mut field),
         )?;
         let ms = 1e3 * start.elapsed().as_secs_f64();
-        let stats = scene.stats();
-        if stats.corrections > 0 {
+        if scene.stats().corrections > 0 {
+            let timing = scene.timing();
             taken.step.push(ms);
-            taken.corrections.push(stats.corrections_ms);
-            taken.contact.push(stats.contact_ms);
+            taken.corrections.push(timing.corrections_ms);
+            taken.contact.push(timing.contact_ms);
         }
         taken.fields.push(field.clone());
     }

@@ -24,7 +24,7 @@ pub fn site_change(model: &Arc<Model>, name: &str) -> upt::Result<()> {
         } else {
             &mut same
         };
-        times.push(scene.stats().prior_ms);
+        times.push(scene.timing().prior_ms);
     }
     let extra = median(new) - median(same);
     Row::new(

@@ -1,6 +1,6 @@
 //! Where the slowest steps lose their time: each stage in the slowest hundredth against its own median.
 
-use upt::SceneStats;
+use upt::SceneTiming;
 
 use gauge::median;
 
@@ -26,7 +26,7 @@ pub struct Tail {
 
 impl Tail {
     /// Notes a step that took `ms` by the clock outside.
-    pub fn push(&mut self, ms: f64, s: &SceneStats) {
+    pub fn push(&mut self, ms: f64, s: &SceneTiming) {
         let own = [
             s.check_ms,
             s.prior_ms,

@@ -72,23 +72,23 @@ pub unsafe extern "C" fn upt_scene_read_timing(
         || {
             let entry = find_scene(scene)?;
             let fill = |struct_size| {
-                let stats = entry.scene.stats();
+                let timing = entry.scene.timing();
                 Ok(upt_scene_timing {
                     struct_size,
                     reserved: [0; 4],
-                    step_count: stats.step_count,
-                    step_ms: stats.step_ms,
-                    check_ms: stats.check_ms,
-                    prior_ms: stats.prior_ms,
-                    encode_ms: stats.encode_ms,
-                    aggregate_ms: stats.aggregate_ms,
-                    latent_ms: stats.latent_ms,
-                    decode_ms: stats.decode_ms,
-                    guard_ms: stats.guard_ms,
-                    corrections_ms: stats.corrections_ms,
-                    contact_ms: stats.contact_ms,
-                    upload_ms: stats.upload_ms,
-                    download_ms: stats.download_ms,
+                    step_count: timing.step_count,
+                    step_ms: timing.step_ms,
+                    check_ms: timing.check_ms,
+                    prior_ms: timing.prior_ms,
+                    encode_ms: timing.encode_ms,
+                    aggregate_ms: timing.aggregate_ms,
+                    latent_ms: timing.latent_ms,
+                    decode_ms: timing.decode_ms,
+                    guard_ms: timing.guard_ms,
+                    corrections_ms: timing.corrections_ms,
+                    contact_ms: timing.contact_ms,
+                    upload_ms: timing.upload_ms,
+                    download_ms: timing.download_ms,
                 })
             };
             // SAFETY: `out` points to a struct whose first field is its size, as the header asks.

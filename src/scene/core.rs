@@ -90,7 +90,7 @@ impl Core {
         }
         // The flags belong to the step that has just been counted.
         self.maker.watch.tell(stats.step_count, &stats);
-        stats.step_ms = start.elapsed().as_secs_f64() * 1e3;
+        stats.timing.step_ms = start.elapsed().as_secs_f64() * 1e3;
         lock_write(published).stats = stats;
         Ok(())
     }
@@ -150,7 +150,7 @@ impl StepMaker {
         let moves = (last, velocity);
         // Loads before tools: a scene that refuses them has not yet forgotten the tools of the last step.
         let acts = (self.loads).take(body, &self.machine, &input.loads, moves)?;
-        stats.check_ms = watch.lap();
+        stats.timing.check_ms = watch.lap();
         let was_driven = self.states.counters.driven;
         let driven = (was_driven, self.corrected.is_some());
         let near = self.tools.update(body, last, input, driven)?;
@@ -183,7 +183,7 @@ impl StepMaker {
             self.predict_and_decode(published, given, learned, stats)?;
             self.correct(published, given, start, stats)?;
         }
-        [stats.upload_ms, stats.download_ms] = self.engine.transfer_ms();
+        [stats.timing.upload_ms, stats.timing.download_ms] = self.engine.transfer_ms();
         let verdict = self.judge(stats)?;
         let replaced = verdict & guard::REFUSED != 0
             && self.refuse(published, verdict, given.is_some(), stats)?;

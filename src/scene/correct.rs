@@ -83,7 +83,7 @@ impl StepMaker {
             corrected.report_to(&report, stats);
         }
         drop(shared);
-        stats.corrections_ms = watch.lap();
+        stats.timing.corrections_ms = watch.lap();
         Ok(())
     }
 

@@ -134,7 +134,7 @@ impl StepMaker {
         let covered = corrected.covers_tools(&self.body.model);
         self.tools.used = covered.then(|| problem.ways.used(&problem.next, step_s));
         self.tools.report_depth(stats);
-        stats.corrections_ms = watch.lap();
+        stats.timing.corrections_ms = watch.lap();
         self.predict_and_decode(published, None, false, stats)
     }
 
@@ -162,7 +162,7 @@ impl StepMaker {
             let (nodes, vectors) = problem.prescribe(compliance, state)?;
             let count = self.body.mesh.node_count();
             self.states.incoming.take_sparse(nodes, vectors, count)?;
-            stats.check_ms += watch.lap();
+            stats.timing.check_ms += watch.lap();
         }
         self.predict_and_decode(published, None, true, stats)?;
         self.finish_tools(published, stats);

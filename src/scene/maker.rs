@@ -24,7 +24,7 @@ use crate::kernels::largest::largest;
 use crate::kernels::{Isa, Machine, Pool};
 use crate::memory::HeldBytes;
 use crate::options::SceneOptions;
-use crate::stats::{SceneStats, flag};
+use crate::stats::{SceneStats, SceneTiming, flag};
 
 /// See the module. A step fills `states.next`; until it is published nothing else of the scene's state changes.
 #[derive(HeldBytes)]
@@ -99,16 +99,6 @@ impl StepMaker {
                 false => 0,
             },
             step_count: counters.step_count,
-            step_ms: 0.0,
-            check_ms: 0.0,
-            prior_ms: 0.0,
-            encode_ms: 0.0,
-            aggregate_ms: 0.0,
-            latent_ms: 0.0,
-            decode_ms: 0.0,
-            guard_ms: 0.0,
-            corrections_ms: 0.0,
-            contact_ms: 0.0,
             corrections: 0,
             evaluations: 0,
             substeps: 0,
@@ -124,13 +114,12 @@ impl StepMaker {
             provider: self.engine.provider(),
             precision: self.engine.precision(),
             step_path: self.engine.path(),
-            upload_ms: 0.0,
-            download_ms: 0.0,
             max_displacement_mm: counters.max_displacement,
             indicator: 0.0,
             prior_forces: self.engine.linear().is_some() && self.corrected.is_none(),
             sleeping: counters.sleeping,
             poisoned: false,
+            timing: SceneTiming::default(),
         }
     }
 
@@ -222,7 +211,7 @@ impl StepMaker {
         drop(shared);
         stats.decoded_node_count = self.shown.plan.nodes().len() as u64;
         self.enforce_next();
-        stats.decode_ms = watch.lap();
+        stats.timing.decode_ms = watch.lap();
         Ok(())
     }
 

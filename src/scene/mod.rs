@@ -99,7 +99,6 @@ use published::Published;
 use published::lock_read;
 use region::check_nodes;
 use shared::Shared;
-use tissue::Tissue;
 use worker::Worker;
 
 /// A tissue that is stepped. All methods take `&self`; concurrent use gives [`Error::Busy`], never a wait.
@@ -168,17 +167,6 @@ impl Scene {
     /// The length of a step, s: the bundle's, or the scene's own.
     pub fn step_s(&self) -> f64 {
         self.integrator.step_s
-    }
-
-    /// What its readers know of it.
-    fn tissue<'a>(&'a self, model: &'a Arc<Model>, mesh: &'a Arc<Mesh>) -> Tissue<'a> {
-        Tissue {
-            published: &self.shared.published,
-            model,
-            mesh,
-            intact_nodes: self.mesh.node_count(),
-            integrator: self.integrator,
-        }
     }
 
     /// Nodes of the scene's mesh, `K`, and those that cuts have added.

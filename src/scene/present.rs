@@ -13,6 +13,7 @@ use super::shared::lock;
 use super::step_input::FrameInput;
 use super::step_states::StepStates;
 use super::supports;
+use super::tissue::Tissue;
 use super::{Scene, StepInput};
 use crate::contact::Past;
 use crate::error::{Error, Result};
@@ -82,7 +83,13 @@ impl Scene {
         let cut = lock_read(&self.shared.published).cut.clone();
         let model = cut.as_ref().map_or(&self.model, |cut| &cut.0);
         let mesh = cut.as_ref().map_or(&self.mesh, |cut| &cut.0.mesh);
-        let tissue = self.tissue(model, mesh);
+        let tissue = Tissue {
+            published: &self.shared.published,
+            model,
+            mesh,
+            intact_nodes: self.mesh.node_count(),
+            integrator: self.integrator,
+        };
         presenters.prepare(&tissue, view, || {
             let begun = lock_read(&self.shared.published).frame_state.is_some();
             match begun {

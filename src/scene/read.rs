@@ -5,7 +5,7 @@ use super::published::View;
 use super::published::lock_read;
 use crate::error::Result;
 use crate::output::Output;
-use crate::stats::SceneStats;
+use crate::stats::{SceneStats, SceneTiming};
 
 impl Scene {
     /// The last published state, `[n,3]`, mm, region order.
@@ -79,6 +79,15 @@ impl Scene {
             + self.surface_bytes()
             + self.shared.record.held_bytes()) as u64;
         stats
+    }
+
+    /// How long the last step and its stages took.
+    pub fn timing(&self) -> SceneTiming {
+        let stats = lock_read(&self.shared.published).stats;
+        SceneTiming {
+            step_count: stats.step_count,
+            ..stats.timing
+        }
     }
 
     /// Nodes in contact in the last step, in the host's order, and `[m,3]` their displacements, mm.

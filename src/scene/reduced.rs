@@ -166,7 +166,7 @@ impl ReducedEngine {
         let (Some(map), Some(own), true) = (&self.kind.learned, &mut self.learned, inputs.learned)
         else {
             self.drop_correction();
-            stats.prior_ms = watch.lap();
+            stats.timing.prior_ms = watch.lap();
             return Ok(());
         };
         let table = &self.linear.table;
@@ -189,7 +189,7 @@ impl ReducedEngine {
             None => &self.last.b,
         };
         drop(span);
-        stats.prior_ms = watch.lap();
+        stats.timing.prior_ms = watch.lap();
         let span = tracing::trace_span!("latent").entered();
 
         let input = own.stage.input(0);
@@ -240,9 +240,9 @@ impl ReducedEngine {
             next.b.iter_mut().for_each(|b| *b *= scale);
         }
         drop(span);
-        stats.latent_ms = watch.lap();
+        stats.timing.latent_ms = watch.lap();
         combine(compute, table, &own.mode_rows, next)?;
-        stats.prior_ms += watch.lap();
+        stats.timing.prior_ms += watch.lap();
         Ok(())
     }
 

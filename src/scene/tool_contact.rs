@@ -109,7 +109,7 @@ impl ToolContact {
         let Some(problem) = &self.problem else {
             return;
         };
-        stats.contact_ms = problem.solution.spent_ms();
+        stats.timing.contact_ms = problem.solution.spent_ms();
         let readings = problem.next.tools.iter().map(|held| held.reading);
         if readings
             .clone()

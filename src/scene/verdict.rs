@@ -41,7 +41,7 @@ impl StepMaker {
         self.watch.look_at_contact(&self.body, of_step, stats)?;
         stats.flags |= verdict;
         stats.max_displacement_mm = max;
-        stats.guard_ms += watch.lap();
+        stats.timing.guard_ms += watch.lap();
         Ok(verdict)
     }
 

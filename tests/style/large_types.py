@@ -31,6 +31,7 @@ RECORDS = {
     "upt::SceneFields": "a line of a recording",
     "upt::SceneOptions": "upt_scene_options",
     "upt::SceneStats": "upt_scene_stats",
+    "upt::SceneTiming": "upt_scene_timing",
 }
 
 # Crate and type: fields and methods at most.

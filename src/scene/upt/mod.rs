@@ -226,7 +226,7 @@ impl UptEngine {
             linear.decode(compute, inputs.plan, &next.q_prior, &mut next.prior_field)?;
         }
         drop(span);
-        stats.prior_ms = watch.lap();
+        stats.timing.prior_ms = watch.lap();
         if !inputs.learned {
             return Ok(());
         }
@@ -244,8 +244,8 @@ impl UptEngine {
             &self.last,
         );
         drop(span);
-        stats.encode_ms = watch.lap();
-        [stats.aggregate_ms, stats.latent_ms] = self.network(compute)?;
+        stats.timing.encode_ms = watch.lap();
+        [stats.timing.aggregate_ms, stats.timing.latent_ms] = self.network(compute)?;
         Ok(())
     }
 

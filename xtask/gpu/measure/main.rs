@@ -187,7 +187,7 @@ impl Way {
                 let start = Instant::now();
                 pushes::push(scene, nodes, t, Some(&mut out))?;
                 let ms = start.elapsed().as_secs_f64() * 1e3;
-                let s = scene.stats();
+                let s = scene.timing();
                 let compute = s.latent_ms + s.decode_ms - s.upload_ms - s.download_ms;
                 Ok([ms, s.upload_ms, compute, s.download_ms])
             });

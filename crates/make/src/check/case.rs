@@ -187,7 +187,7 @@ pub fn speed(model: &Arc<Model>, scores: &[Score]) -> Result<Vec<f64>> {
     let mut times = Vec::new();
     for (nodes, vectors) in scores.iter().flat_map(|score| &score.touches) {
         if scene.step(Contact::Sparse { nodes, vectors }, None).is_ok() && !nodes.is_empty() {
-            times.push(scene.stats().step_ms);
+            times.push(scene.timing().step_ms);
         }
         if times.len() == TIMED {
             break;
