@@ -44,6 +44,8 @@ check unpack tar -xzf "${archive:-none}" -C "$work/elsewhere"
 rm -rf "$work"/dist/libupt-*/ "$work/again"
 prefix="$(find "$work/elsewhere" -mindepth 1 -maxdepth 1 -type d | head -n 1)"
 check bill_of_materials python3 tests/package/sbom.py "${archive:-none}" "$prefix"
+# Packages that this run does not build have bills, too.
+check bills_of_others "${UPT_PYTHON:-$root/target/venv/bin/python}" tests/package/bills.py "$work/bills"
 unset ORT_DYLIB_PATH LD_LIBRARY_PATH UPT_LIB_DIR UPT_INCLUDE_DIR UPT_BUNDLES
 cd "$work/elsewhere" || exit 1
 

@@ -11,6 +11,7 @@ import re
 import subprocess
 import tomllib
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,8 +34,9 @@ class Crate:
     needs: list[str] = field(default_factory=list)
 
 
+@cache
 def cargo(*words: str) -> str:
-    """What cargo prints."""
+    """What cargo prints, asked once."""
     command = [os.environ.get("CARGO", "cargo"), *words]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, encoding="utf-8", check=True).stdout
 

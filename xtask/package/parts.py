@@ -29,8 +29,8 @@ TARGETS = {
     "win_amd64": "x86_64-pc-windows-gnu",
     "arm64": "aarch64-apple-darwin",
 }
-LIBRARY = re.compile(r"libupt\.so[.\d]*|upt\.dll|libupt\.dylib|upt\.wasm")
-RUNTIME = re.compile(r"libonnxruntime\.so[.\d]*|onnxruntime\.dll|libonnxruntime\.dylib")
+LIBRARY = re.compile(r"libupt\.so[.\d]*|upt\.dll|libupt[.\d]*\.dylib|upt\.wasm")
+RUNTIME = re.compile(r"libonnxruntime\.so[.\d]*|onnxruntime\.dll|libonnxruntime[.\d]*\.dylib")
 
 
 @dataclass
@@ -61,6 +61,11 @@ def members(package: Path) -> Iterator[tuple[str, bytes]]:
                 yield member.name, stream.read()
 
 
+def is_source(package: Path) -> bool:
+    """A package of crates.io or an sdist, from which the library is built elsewhere."""
+    return bool(re.fullmatch(r"libupt-[^-]+\.tar\.gz|.+\.crate", package.name))
+
+
 def words(package: Path) -> tuple[str, ...]:
     """What cargo builds for a package, by its name."""
     name = package.name
@@ -69,8 +74,8 @@ def words(package: Path) -> tuple[str, ...]:
     if re.fullmatch(r"libupt-[^-]+\.tgz", name):
         features = ("--no-default-features", "--features", "instruments")
         return ("-p", "libupt", *features, "--target", "wasm32-unknown-unknown")
-    if name.startswith("org.libupt."):
-        return ("-p", "libupt")
+    if name.startswith("org.libupt.") or is_source(package):
+        return ("-p", name.removesuffix(".crate").rpartition("-")[0] if name.endswith(".crate") else "libupt")
     if name.endswith(".whl"):
         target = next(
             target for tag, target in TARGETS.items() if name.endswith(f"_{tag}.whl") or f"-{tag}.whl" in name
@@ -152,7 +157,8 @@ def of(package: Path) -> tuple[Part, list[Part]]:
         others.append(
             Part("three.js", "three", three, "MIT", purl=f"pkg:npm/three@{three}", source="https://threejs.org")
         )
-    linked = of_crates(words(package)) if library else []
+    # Of source, what a build of it will take with its lock file.
+    linked = of_crates(words(package)) if library or is_source(package) else []
     called = {need for part in linked for need in part.needs}
     digest = hashlib.sha256(package.read_bytes()).hexdigest()
     kind = "application" if command else "library"

@@ -12,7 +12,7 @@ use crate::{archive, venv};
 const FOLDER: &str = "target/package";
 
 /// Endings of packages.
-const PACKAGES: [&str; 3] = [".tar.gz", ".tgz", ".whl"];
+const PACKAGES: [&str; 4] = [".tar.gz", ".tgz", ".whl", ".crate"];
 
 /// `PACKAGE.cdx.json` and `PACKAGE.spdx.json` of each, and `SHA256SUMS` of their folders.
 pub fn write(workspace: &Workspace, packages: &[PathBuf]) -> Result<()> {
