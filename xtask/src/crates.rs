@@ -35,7 +35,7 @@ pub fn package(workspace: &Workspace, out: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// Names of the packages without `publish = false`.
-fn published(workspace: &Workspace) -> Result<Vec<String>> {
+pub fn published(workspace: &Workspace) -> Result<Vec<String>> {
     let mut command = workspace.cargo("metadata --format-version 1 --no-deps --offline");
     let told = command.output().context("cargo metadata")?;
     let metadata: serde_json::Value = serde_json::from_slice(&told.stdout)?;

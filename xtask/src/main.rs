@@ -15,6 +15,7 @@ mod parts;
 mod process;
 mod rivals;
 mod sbom;
+mod semver;
 mod stages;
 mod system;
 mod test;
@@ -78,6 +79,11 @@ enum Task {
         /// Packages; default: all of target/package.
         packages: Vec<std::path::PathBuf>,
     },
+    /// Compare the Rust interface of the published packages with that of a release or a commit (cargo-semver-checks).
+    #[command(
+        after_help = "Examples:\n  cargo xtask semver\n  cargo xtask semver --baseline HEAD~20 --package libupt-contact"
+    )]
+    Semver(semver::Options),
     /// Write what a manufacturer needs to know of libupt as software of unknown provenance (IEC 62304): requirements and their tests, anomalies, hashes.
     #[command(after_help = "Example:\n  cargo xtask soup --out target/soup")]
     Soup {
@@ -179,6 +185,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::View { bundle } => upkeep::view(workspace, &bundle),
         Task::Package(options) => package::run(workspace, &options),
         Task::Sbom { packages } => sbom::run(workspace, &packages),
+        Task::Semver(options) => semver::run(workspace, &options),
         Task::Soup { out } => upkeep::soup(workspace, &out),
         Task::Site { out } => web::site(workspace, &out),
         Task::Readme { reports, page } => upkeep::readme(workspace, &page, &reports),
