@@ -56,8 +56,6 @@ struct Iterate<'a> {
     g: &'a mut Vec<f32>,
     /// Smallest det F.
     det: f32,
-    /// How deep tools and tissue lie in each other, where an iteration has looked, mm.
-    sunk_mm: Option<f32>,
 }
 
 impl Iterate<'_> {
@@ -70,7 +68,6 @@ impl Iterate<'_> {
         report: &mut Report,
     ) -> Result<()> {
         (self.det, _) = balance.residual(context, [last, self.u, self.u], self.g, report)?;
-        self.sunk_mm = None;
         Ok(())
     }
 }
@@ -116,7 +113,6 @@ impl ToolStep<'_> {
             u: &mut u,
             g: &mut g,
             det: 1.0,
-            sunk_mm: None,
         };
         let result = self
             .iterate_loaded(&mut at)

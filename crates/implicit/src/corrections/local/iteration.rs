@@ -5,17 +5,17 @@ use std::cell::RefCell;
 use super::columns::Response;
 use super::linear::WHAT;
 use super::step::{add, dot, resize};
-use super::{Gain, LocalSolver, StepContext, each_load};
+use super::{LocalSolver, StepContext, each_load};
 use crate::contact::{Compliance, ContactProblem, State};
 use crate::corrections::line_search::{DEAR_SHORTENINGS, LineSearch, SHORTENINGS, Tried};
 use crate::corrections::precondition::{DIAGONAL_WEIGHT, Env};
 use crate::corrections::solver::SMALLEST_DET;
-use crate::corrections::tool_contact::SUNK_MM;
+use crate::corrections::tool_contact::KEPT_MM;
 use crate::error::Result;
 use crate::memory;
 
 impl LocalSolver {
-    /// One iteration with the tools at part `way` of their way.
+    /// One iteration with the tools at part `way` of their way; tells whether it led to another state.
     pub(in crate::corrections) fn improve(
         &mut self,
         step: &mut StepContext<'_>,
@@ -23,7 +23,7 @@ impl LocalSolver {
         base: &[f32],
         way: f32,
         sunk: impl Fn(&mut ContactProblem, &[f32]) -> f32,
-    ) -> Result<Gain> {
+    ) -> Result<bool> {
         let _span = tracing::trace_span!("iteration").entered();
         let env = step.context.env();
         // The direction for the loads that are there; then what the contact changes at its end, as a second answer of the same preconditioner.
@@ -54,7 +54,7 @@ impl LocalSolver {
                 false => f32::MAX,
             };
             // An iteration may not lose the contact, unless it had been lost.
-            let is_kept = sunk_mm <= 0.5 * SUNK_MM || {
+            let is_kept = sunk_mm <= KEPT_MM || {
                 self.place_at(base, 0.0);
                 sunk_mm <= sunk(problem, &self.residuals.trial)
             };
@@ -66,10 +66,7 @@ impl LocalSolver {
                     if t < 1.0 {
                         problem.kept.blend(&mut problem.next, t);
                     }
-                    return Ok(Gain {
-                        is_better: true,
-                        sunk_mm,
-                    });
+                    return Ok(true);
                 }
                 Tried::Shortened => {}
                 Tried::GivenUp => {
@@ -78,7 +75,7 @@ impl LocalSolver {
                     problem.kept.undo(&mut problem.next);
                     self.pairs.clear();
                     self.coming.clear_tangent();
-                    return Ok(Gain::default());
+                    return Ok(false);
                 }
             }
         }

@@ -72,15 +72,6 @@ pub(super) struct Base<'a> {
     pub residual: &'a [f32],
 }
 
-/// How an iteration went.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Gain {
-    /// It led to another state.
-    pub is_better: bool,
-    /// How deep tools and tissue lie in each other there, mm.
-    pub sunk_mm: f32,
-}
-
 /// A scene's own part.
 #[derive(HeldBytes)]
 pub struct LocalSolver {

@@ -179,12 +179,11 @@ impl ToolStep<'_> {
         let input = self.input;
         let (local, mut step, problem) = self.local_solver()?;
         let deep = |problem: &mut ContactProblem, u: &[f32]| sunk(input, problem, u, way);
-        let gain = local.improve(&mut step, problem, at.u, way, deep)?;
-        if gain.is_better {
+        let is_better = local.improve(&mut step, problem, at.u, way, deep)?;
+        if is_better {
             at.det = local.measured.det;
-            at.sunk_mm = (way >= 1.0).then_some(gain.sunk_mm);
         }
-        Ok(gain.is_better)
+        Ok(is_better)
     }
 
     /// What is out of balance near the tools.

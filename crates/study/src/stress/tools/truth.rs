@@ -9,7 +9,7 @@ use super::run::Hands;
 use crate::stress::Row;
 
 /// Places of a row: the solver takes seconds at each.
-const PLACES: usize = 10;
+const PLACES: usize = 100;
 /// A tool may lie so many times as deep as the solver's, or this deep, mm.
 const TIMES: f64 = 2.0;
 const LEAST_MM: f64 = 0.3;
