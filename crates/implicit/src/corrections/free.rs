@@ -60,12 +60,7 @@ impl FieldStep<'_> {
         if swings {
             self.finish_free(next);
         }
-        if self.report.fell_back {
-            self.solver.stop_next();
-            self.solver.next.leave_load(&self.solver.balance.load)?;
-        }
-        self.solver.next.min_det = self.report.min_det;
-        (self.solver.next).estimate(&self.solver.motion, &mut self.report);
+        self.solver.end(&mut self.report)?;
         Ok(self.report)
     }
 

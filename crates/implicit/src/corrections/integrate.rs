@@ -1,7 +1,7 @@
-//! BDF2 over the steps of a solver: what it knows before a step, velocities and inertia after it, and what it leaves out.
+//! BDF2 over the steps of a solver: what it knows before a step, velocities and inertia after it, and the error of its length.
 
 use super::Integrator;
-use super::input::{Input, SolverContext};
+use super::input::{Input, Report, SolverContext};
 use super::passes;
 use super::solver::ImplicitSolver;
 use crate::error::Result;
@@ -98,6 +98,17 @@ impl ImplicitSolver {
         self.next.load.clear();
         self.next.truncated_mm = 0.0;
         self.clear_pairs();
+    }
+
+    /// The end of a step after [`finish`](Self::finish): what fell back has followed no equation of motion, so it leaves no velocity behind; the state's error is estimated.
+    pub(super) fn end(&mut self, report: &mut Report) -> Result<()> {
+        if report.fell_back {
+            self.stop_next();
+            self.next.leave_load(&self.balance.load)?;
+        }
+        self.next.min_det = report.min_det;
+        self.next.estimate(&self.motion, report);
+        Ok(())
     }
 
     /// Velocity and inertia at `next`, the end of the step from `last`, and what a step of this length leaves out.

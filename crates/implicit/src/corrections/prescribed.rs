@@ -81,13 +81,7 @@ impl FieldStep<'_> {
         }
         (self.solver.fields.u, self.solver.fields.g) = (u, g);
         result?;
-        // What fell back has followed no equation of motion, so it leaves no velocity behind.
-        if self.report.fell_back {
-            self.solver.stop_next();
-            self.solver.next.leave_load(&self.solver.balance.load)?;
-        }
-        self.solver.next.min_det = self.report.min_det;
-        (self.solver.next).estimate(&self.solver.motion, &mut self.report);
+        self.solver.end(&mut self.report)?;
         Ok(self.report)
     }
 

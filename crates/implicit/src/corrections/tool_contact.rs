@@ -123,13 +123,8 @@ impl ToolStep<'_> {
         // Back before anything else can fail: a solver without them could make no further step.
         (self.solver.fields.u, self.solver.fields.g) = (u, g);
         result?;
-        if self.report.fell_back {
-            self.solver.stop_next();
-            self.solver.next.leave_load(&self.solver.balance.load)?;
-        }
-        self.solver.next.min_det = self.report.min_det;
         self.solver.next.level = self.report.level as u32;
-        (self.solver.next).estimate(&self.solver.motion, &mut self.report);
+        self.solver.end(&mut self.report)?;
         self.problem.finish(state(self.input, next), breaks);
         Ok(())
     }
