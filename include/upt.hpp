@@ -887,7 +887,7 @@ public:
     }
     queue_.push_back({now, {instruments.begin(), instruments.end()}});
   }
-  /// Whether a step is to be submitted now.
+  /// Whether a step is due now.
   bool due(double now) const noexcept { return started_ && !in_flight_ && now + 1e-9 >= next_; }
   /// Whether another step is due after that: frames come slower than steps.
   bool behind(double now) const noexcept { return due(now) && now + 1e-9 >= next_ + dt_; }

@@ -1,6 +1,6 @@
 //! Whole steps of a trained bundle against its network split as in the paper (`python -m upt_training.paper_split`).
 //!
-//! The split gets linear elasticity's answer for nothing: its time is the network's alone. libupt's includes it, and the
+//! The split gets linear elasticity's answer free of charge: its time is the network's alone. libupt's includes it, and the
 //! interpolation where a bundle decodes only its anchors. The error is libupt's from the split with that answer added.
 
 use std::path::{Path, PathBuf};

@@ -13,7 +13,7 @@ pub const DECODER_TILE: usize = 1024;
 /// on two, and the slowest hundredth lost twice as much on two.
 const FLOPS_A_THREAD: usize = 100_000_000;
 
-/// Threads for a latent graph of `bytes` that sees `tokens` at most, if `threads` are to be had: each weight (f32) met by each
+/// Threads for a latent graph of `bytes` that sees `tokens` at most, if `threads` are available: each weight (f32) met by each
 /// token is an upper bound of its products and sums.
 fn latent_threads(bytes: usize, tokens: usize, threads: usize) -> usize {
     let flops = 2 * (bytes / 4) * tokens;

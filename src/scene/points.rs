@@ -153,7 +153,7 @@ impl AttachedPoints {
         self.nodes.as_flattened()
     }
 
-    /// Where a network is to be asked, `[n,3]`, rest mm.
+    /// Where a network is evaluated, `[n,3]`, rest mm.
     pub fn places(&self) -> &[f32] {
         &self.places
     }

@@ -26,7 +26,7 @@ BODY = {
 
 
 def marked(page: markdown.Page) -> list[markdown.Block]:
-    """The blocks that are to be tried."""
+    """The blocks to try."""
     return [block for block in page.blocks if {"complete", "body"} & set(block.marks)]
 
 

@@ -1,7 +1,8 @@
 """Phrases that pages do not have: those of a laboratory's diary, and those that readers stumble over.
 
-Pages say what is. What was before, and when which machine was busy, belongs into the history, the changelog and the
-decisions, which are not looked at.
+They are looked for in README and docs/, which have the help of `upt` too, and in sources, whose comments and errors
+are read as well. Pages say what is. What was before, and when which machine was busy, belongs into the history, the
+changelog and the decisions, which are not looked at.
 """
 
 from __future__ import annotations
@@ -30,13 +31,18 @@ STILTED = (
     "what it leaves out",
     "answer for nothing",
 )
+SOURCES = (".rs", ".py", ".h", ".hpp", ".cs", ".js", ".mjs", ".gd")
+#: Not yet read.
+LATER = ("crates/implicit/src/corrections/local",)
 PHRASES = re.compile(r"\b(" + "|".join(DIARY + STILTED) + r")\b", re.IGNORECASE)
 
 
 def looked_at(path: Path) -> bool:
-    """README and the pages of docs/ but for the decisions."""
-    inside = path.relative_to(ROOT).parts
-    return path == ROOT / "README.md" or (inside[0] == "docs" and inside[1] != "decisions")
+    """README, the pages of docs/ but for the decisions, and sources but for this one."""
+    inside = path.relative_to(ROOT)
+    if path.suffix in SOURCES:
+        return path != Path(__file__) and not any(inside.is_relative_to(folder) for folder in LATER)
+    return path == ROOT / "README.md" or (inside.parts[0] == "docs" and inside.parts[1] != "decisions")
 
 
 def faults(path: Path) -> list[str]:

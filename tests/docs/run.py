@@ -96,6 +96,8 @@ def main() -> int:
         tally.add(english.faults(path))
         if path.name != "CHANGELOG.md":
             tally.add(commands.faults(path))
+    sources = sorted(path for path in known if path.suffix in english.SOURCES)
+    tally.add([fault for path in sources for fault in english.faults(path)])
     for name in ("README.md", "SUMMARY.md", "decisions/README.md"):
         tally.add(index(pages, name))
     tally.add(bundles.faults())

@@ -223,7 +223,7 @@ fn ties_hold_what_is_left() {
     for _ in 0..20 {
         go(&scene, pulled(&ties));
     }
-    // Softer tissue gives way.
+    // Softer tissue yields.
     let parted = reading(&scene);
     println!("{whole} mN, {first} after the cut, {parted} at rest");
     assert!((first / whole - 1.0).abs() < 0.2 && parted < 0.99 * whole && parted > 0.3 * whole);

@@ -154,7 +154,7 @@ def a_replay_makes_the_steps_of_the_recording_again():
         at = 0
 
         def steps(count: int, tool) -> list[tuple]:
-            """What is new after each of the next steps, with the tool where it is to be after so many of them."""
+            """What is new after each of the next steps, with the tool at its place after so many of them."""
             nonlocal at
             seen: dict[int, tuple] = {}
             while len(seen) < count + 1:

@@ -64,7 +64,7 @@ def a_blade_cuts_and_undo_heals():
         surface, at = Surface(), 0
 
         def go(tool, until) -> Frame:
-            """Frames with the tool where it is to be at each step, until one is as it should be."""
+            """Frames with the tool at its place in each step, until one is as it should be."""
             nonlocal at
             begun, done = None, 0
             for _ in range(3000):

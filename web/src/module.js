@@ -21,7 +21,7 @@ async function compile(source) {
   const response = await source;
   if (!(response instanceof Response)) return WebAssembly.compile(response);
   if (!response.ok) throw new UptError("UPT_ERR_IO", `${response.url}: ${response.status} ${response.statusText}`);
-  // Servers that do not know the type of .wasm files send another one, of which nothing is compiled while it comes.
+  // Servers that do not know the type of .wasm files send another one, and then nothing is compiled while it arrives.
   const streams = response.headers.get("content-type")?.startsWith("application/wasm");
   return streams ? WebAssembly.compileStreaming(response) : WebAssembly.compile(await response.arrayBuffer());
 }

@@ -133,7 +133,7 @@ impl Samples {
         })
     }
 
-    /// The same of rows `domain` of a mesh's boundary triangles `surface`.
+    /// The samples of rows `domain` of a mesh's boundary triangles `surface`.
     ///
     /// Panics when `domain` names a row that `surface` does not have.
     pub fn of_domain(

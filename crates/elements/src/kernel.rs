@@ -70,7 +70,7 @@ fn flops_of<M: Isochoric>(_: M, nodes: usize, tets: usize) -> usize {
     shape + tets * tet + forces + 3 * (nodes - 1) + 3 * nodes
 }
 
-/// The same of a law in principal stretches, with even exponents of size 16 to 31.
+/// The same kernel for a law in principal stretches, with even exponents of size 16 to 31.
 fn flops_of_stretches(terms: usize, nodes: usize, tets: usize) -> usize {
     // H; cof F and J; A, D and its invariants; the inverse; stress and forces.
     let tet = 45 + 60 + 70 + 36 + 100;

@@ -92,7 +92,7 @@ impl<'a, T: Copy> Output<'a, T> {
         unsafe { std::slice::from_raw_parts_mut(self.start, self.len) }
     }
 
-    /// What is to be written.
+    /// What the caller wants written.
     ///
     /// # Safety
     /// Nothing is made uninitialised: the memory may be a `&mut [T]` of the caller.

@@ -115,7 +115,7 @@ def nifti(path):
 
 
 def itk(path):
-    """The same of a volume in NRRD or MetaImage form."""
+    """The labels of a volume in NRRD or MetaImage form."""
     import SimpleITK
 
     SimpleITK.ProcessObject.SetGlobalWarningDisplay(False)

@@ -72,7 +72,7 @@ impl Numbers {
 /// What a file leaves out is memory all the same: a small file asks for no more than so many times its size.
 const MOST_ZEROS: usize = 64;
 
-/// The numbers of a whole table, where a file that holds `stored` of its bytes or numbers may ask for so many; `leaves` says what it leaves out.
+/// The numbers of a whole table, where a file that holds `stored` of its bytes or numbers may ask for so many; `leaves` says which of them are left out.
 pub(super) fn fits(
     file: &TensorFile,
     leaves: &str,

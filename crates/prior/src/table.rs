@@ -101,7 +101,7 @@ impl PriorTable {
         !self.sources.is_empty()
     }
 
-    /// The same of a list; `room` is taken where they are others.
+    /// The same for a list; `room` is taken where they are others.
     ///
     /// # Errors
     /// [`field::Error::OutOfMemory`].

@@ -63,7 +63,7 @@ impl Subject {
         Ok(Scene::new(Arc::clone(&self.model), &options)?)
     }
 
-    /// The same of a changed copy of the bundle.
+    /// The same subject with a changed copy of the bundle.
     ///
     /// # Errors
     /// The copy cannot be opened.

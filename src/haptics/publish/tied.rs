@@ -1,6 +1,6 @@
 //! Ties that end on the hand's instrument: rows beside its samples, numbered as in a step ([`crate::contact::ties`]), whose law is the spring's.
 //!
-//! Between two steps the hand has the far end of a tie where its tool is, and the tissue at the tie's point gives way with the compliance that samples have. The
+//! Between two steps the hand has the far end of a tie where its tool is, and the tissue at the tie's point yields with the compliance that samples have. The
 //! damper takes no part; what it pulled with in the step is kept, as an error of the step that the hand must not feel as a motion.
 
 use ::contact::{End, Pose, Sample, Samples, Vector};

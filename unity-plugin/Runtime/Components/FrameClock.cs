@@ -75,7 +75,7 @@ namespace Upt
             used++;
         }
 
-        /// <summary>True when the next step is to be submitted.</summary>
+        /// <summary>True when the next step is due.</summary>
         public bool IsDue(double now)
         {
             return started && !inFlight && now + 1e-9 >= next;

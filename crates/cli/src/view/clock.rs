@@ -51,7 +51,7 @@ impl Clock {
         self.poses.push_back((now, tool));
     }
 
-    /// Whether a step is to be submitted.
+    /// Whether a step is due.
     pub fn due(&self, now: f64) -> bool {
         self.started && !self.in_flight && now + 1e-9 >= self.next
     }

@@ -53,7 +53,7 @@ pub struct Session {
     count: usize,
     penetration_mm: f32,
     frame_ms: f32,
-    /// What changes the body, and what the page is to be told of it.
+    /// What changes the body, and what the page must know of it.
     surgery: Surgery,
     breath: Breath,
     news: Vec<(SurfaceHeader, Vec<u8>)>,
@@ -203,7 +203,7 @@ impl Session {
         Ok(())
     }
 
-    /// What the page is to be told before the next frame.
+    /// What the page must know before the next frame.
     pub fn told(&mut self) -> Result<Vec<Message>> {
         let mut messages = Vec::new();
         for (header, bytes) in self.news.drain(..) {

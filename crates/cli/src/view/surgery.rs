@@ -253,7 +253,7 @@ impl Surgery {
         self.vertices
     }
 
-    /// What the page is to be told of the surface, text and numbers (protocol.rs), where it has changed.
+    /// What the page must know of the surface, text and numbers (protocol.rs), where it has changed.
     ///
     /// # Errors
     /// Those of `upt_scene_update_surface`.

@@ -93,7 +93,7 @@ impl Past {
     }
 
     /// Whether the forces of a tool that pushed `before` hold little but each other: they are [`WEDGED`] times as large as those, and as their own sum. Two rows on
-    /// opposite sides of a thin tool, on tissue between which nothing gives way, drive each other apart so.
+    /// opposite sides of a thin tool, on tissue between which nothing yields, drive each other apart so.
     pub fn is_wedged(&self, before: &Past) -> bool {
         let all = |past: &Past, index: usize| {
             let own = past.forces.iter();

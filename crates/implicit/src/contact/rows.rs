@@ -319,7 +319,7 @@ mod tests {
         slab(1.0, [from, to], at, outward, force, put)
     }
 
-    /// The same of half the thickness `half`.
+    /// A plate of half the thickness `half`.
     fn slab(
         half: f32,
         [from, to]: [f32; 2],

@@ -250,7 +250,7 @@ pub fn check(ties: &[Tie], tools: usize, nodes: usize, moves: impl Fn(u32) -> bo
             }
             if !point.entries().any(|(node, _)| moves(node)) {
                 return fail(format!(
-                    "{field} are {:?}, of which none is both free and near the domain, the surface that instruments may touch",
+                    "{field} are {:?}, none of them both free and near the domain, the surface that instruments may touch",
                     point.nodes
                 ));
             }

@@ -219,7 +219,7 @@ impl Corrections {
 }
 
 impl TimeStep {
-    /// The same of a body that has been cut, with its diagonal.
+    /// Those of a body that has been cut, with its diagonal.
     fn cut(&self, diagonal: &Diagonal, touched: &[u32]) -> Result<TimeStep> {
         let count = diagonal.mass.len();
         let mut inverse_blocks = memory::room(count, WHAT)?;

@@ -42,7 +42,7 @@ pub struct FarField {
     /// Rest volume of each chunk times its stiffness over the material's, mm³. After a cut these are the chunks of the intact body, with all that their
     /// elements have become.
     pub(super) volumes: Vec<f64>,
-    /// The same of the chunks that the elements are packed in.
+    /// Those of the chunks that the elements are packed in.
     pub(super) packed_volumes: Vec<f64>,
     /// Where each chunk's nodes start in the two lists below `[C+1]`.
     starts: Vec<u32>,

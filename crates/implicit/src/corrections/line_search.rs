@@ -27,7 +27,7 @@ pub(super) enum Tried {
     Accepted,
     /// `t` is shorter now, and is tried next.
     Shortened,
-    /// The direction is of no use: the state stays, and what made the direction is to be forgotten.
+    /// The direction is of no use: the state stays, and the solver must forget what made the direction.
     GivenUp,
 }
 

@@ -21,7 +21,7 @@ pub struct Memory {
     changes: Vec<Vec<f32>>,
     /// Slots from the oldest to the newest.
     order: Vec<usize>,
-    /// The same of the last published state.
+    /// Those of the last published state.
     published: Vec<usize>,
     /// `s_i . y_j` over all nodes, by slot, where `i` is not newer than `j`: the recursions ask for no others.
     products: Vec<[f64; SLOTS]>,

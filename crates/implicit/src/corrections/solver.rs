@@ -118,7 +118,7 @@ impl ImplicitSolver {
         }
     }
 
-    /// Back to the pairs of whole steps, of which none is known to the tangent; what is near stays.
+    /// Back to the pairs of whole steps, none of them known to the tangent; what is near stays.
     pub(super) fn end_substeps(&mut self) {
         self.memory.begin();
         if let Some(local) = &mut self.local {

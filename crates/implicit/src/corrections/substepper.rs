@@ -1,4 +1,4 @@
-//! Steps of which several make one of the scene's, between two states that the host sees.
+//! Substeps: several make one step of the scene, between two states that the host sees.
 //!
 //! The first starts from the last two states and their velocities, by the cubic through them, and without L-BFGS pairs. So what lasts from
 //! step to step is the same with them and without, in snapshots too.

@@ -80,7 +80,7 @@ impl Substeps {
         })
     }
 
-    /// Whether a step that leaves out so much is to be made of substeps, mm.
+    /// Whether a step with an error of this size from its length is made of substeps, mm.
     fn helps(&self, left_out_mm: f32) -> bool {
         left_out_mm > self.limit_mm
     }

@@ -54,7 +54,7 @@ pub struct Part {
     /// Mean over the nodes of the squared distance, summed over the steps, mm².
     pub mse: f64,
     pub baseline: f64,
-    /// The same of the true displacement.
+    /// Those of the true displacement.
     pub truth: f64,
     /// Largest over nodes and axes, mm.
     pub largest: f64,

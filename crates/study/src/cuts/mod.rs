@@ -39,7 +39,7 @@ struct Row {
     mse: f64,
     near_mse: f64,
     worst_mse: f64,
-    /// Sums over frames and cases: what the force on the ball is off by, over what it is; the same of the blade.
+    /// Sums over frames and cases: what the force on the ball is off by, over what it is; and that of the blade.
     force_error: Option<f64>,
     blade_error: Option<f64>,
     /// Volume that has left, of the library over the solver's.

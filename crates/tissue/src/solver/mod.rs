@@ -247,7 +247,7 @@ impl Solver {
 
     /// The same with tools ([`Solver::set_tools`]), each moved to its pose within the frame.
     ///
-    /// A node may be prescribed and touched: it then goes where it is told, and the tool gives way to it.
+    /// A node may be prescribed and touched: it then goes where it is told, and the tool does not hold it back.
     pub fn step_tools(
         &mut self,
         contact: &[ContactNode],

@@ -91,7 +91,7 @@ fn corners_that_differ_in_their_last_digits_are_welded() {
             "{volume}, {wanted}"
         );
     }
-    // A gap that is to be seen stays one.
+    // A visible gap stays one.
     assert!(matches!(
         file(0.1).unwrap_err(),
         ImportError::Open { count: 6, .. }

@@ -64,7 +64,7 @@ let sequence = 0;
 let latest; // the frame that has come and is not shown yet
 let told = 0; // when the readouts were written
 let lead = 12; // ms before a picture at which its frame is asked for
-let due = 0; // when it is to be asked for
+let due = 0; // when the page asks for it
 const needs = []; // ms from there until it had come, of the last frames
 let interval = 1000 / 60; // ms from picture to picture
 let before = 0; // when the last picture was begun

@@ -66,7 +66,7 @@ impl Env<'_> {
         Ok(row_dots(self.isa, self.pool, modes, rows, q, out)?)
     }
 
-    /// The same of `n` lists of coordinates `[n,Q]` that are zero outside of some ranges, to `out [n,r]`.
+    /// The same for `n` lists of coordinates `[n,Q]` that are zero outside of some ranges, to `out [n,r]`.
     pub fn on_modes_in(&self, ranges: &[Range<usize>], q: &[f32], out: &mut [f32]) {
         let (modes, rows) = (self.space.modes(), self.space.rows());
         row_dots_in(self.isa, modes, rows, ranges, q, out);

@@ -16,7 +16,7 @@ pub(super) struct Row {
     pub force: Vector,
     /// At the end of the last inner step, mm; none for a row that is new.
     pub last_gap: Option<f32>,
-    /// The same of a bound sample: its way from its place.
+    /// The row of a bound sample: its way from its place.
     pub last_slip: Option<Vector>,
     /// Of this step: where the free update left it.
     pub point: Vector,
