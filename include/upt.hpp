@@ -609,6 +609,11 @@ public:
     out = make<upt_cut>();
     return check(upt_scene_remove(handle_, &instrument, most_mm3, &out));
   }
+  /// Parts tissue that is longer than stretch times its length at rest, across that direction.
+  upt_status tear(std::uint32_t stroke, float stretch, std::uint32_t most, upt_cut &out) {
+    out = make<upt_cut>();
+    return check(upt_scene_tear(handle_, stroke, stretch, most, &out));
+  }
   /// Multiplies the stiffness of elements of the model's mesh.
   upt_status scale_stiffness(span<const std::uint32_t> elements, float factor, upt_cut &out) {
     out = make<upt_cut>();

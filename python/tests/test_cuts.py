@@ -63,6 +63,10 @@ def test_a_scene_is_cut_and_its_surface_follows(liver):
         np.testing.assert_allclose(now.rest + frame, at, atol=1e-3)
         ball.position = pressing(liver, 8.0)
         assert scene.remove(ball, 30.0).removed_mm3 == pytest.approx(30.0, rel=0.2)
+        with pytest.raises(upt.ArgumentError, match="above 1"):
+            scene.tear(1.0)
+        torn = scene.tear(1.05, most=2)
+        assert torn.area_mm2 > 0 and torn.is_changed
         assert scene.scale_stiffness([0, 1], 2.0).node_count == scene.node_count
         assert scene.drop_fragments().fragment_count == 0
         cut = scene.save()

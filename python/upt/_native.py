@@ -1318,6 +1318,7 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_cut": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_cut_with": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_scene_remove": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_float, ctypes.c_void_p]),
+    "upt_scene_tear": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_float, ctypes.c_uint32, ctypes.c_void_p]),
     "upt_scene_scale_stiffness": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_float, ctypes.c_void_p]),
     "upt_scene_drop_fragments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_read_node_count": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),

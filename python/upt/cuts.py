@@ -96,6 +96,25 @@ class Cuts:
         self._fit()
         return out
 
+    def tear(self, stretch: float, most: int = 16, stroke: int = 0) -> Cut:
+        """Parts tissue that is longer than `stretch` times its length at rest, across that direction as a blade would.
+
+        Call it before each step: a tear grows as the tissue gives way, and `Cut.area_mm2` says what it has laid open.
+
+        Args:
+            stretch: the largest principal stretch that the tissue bears, above 1.
+            most: elements at most whose stretch starts a tear in this call; those that it touches part with them.
+            stroke: calls with the same number are one tear that goes on.
+
+        Raises:
+            upt.ArgumentError: the stretch is not above 1, or the body would have more copies than nodes.
+            upt.UnsupportedError: the scene makes no corrections.
+        """
+        out = Cut()
+        check(lib.upt_scene_tear(self._handle, stroke, number(stretch, "stretch"), most, byref(out)))
+        self._fit()
+        return out
+
     def scale_stiffness(self, elements: ArrayLike, factor: float) -> Cut:
         """Multiplies the stiffness of elements, rows of `Model.tets`: coagulation, oedema, softening."""
         chosen = indices(elements, "elements")

@@ -108,6 +108,7 @@ pub enum Line<'a> {
     Hull(Cow<'a, Shape>),
     Cut(Cut<'a>),
     Remove(Remove<'a>),
+    Tear(Tear),
     ScaleStiffness(Stiffness<'a>),
     DropFragments {},
     Reset {},
@@ -172,6 +173,15 @@ pub struct Blade {
 pub struct Remove<'a> {
     pub instrument: Instrument<'a>,
     pub most_mm3: f32,
+}
+
+/// The arguments of `upt_scene_tear`.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tear {
+    pub stroke: u32,
+    pub stretch: f32,
+    pub most: u32,
 }
 
 /// The arguments of `upt_scene_scale_stiffness`.

@@ -132,6 +132,28 @@ impl Scene {
         change.map(Cut::from)
     }
 
+    /// Parts tissue that is longer than `stretch` times its length at rest in some direction, across that direction as a blade would: the most stretched elements
+    /// first, `most` of them and what their tears touch at most. Nothing tears unless this is called; called once before each step, a tear grows as the tissue gives
+    /// way. Calls with the same `stroke` are one tear that goes on: what it has parted it does not part again.
+    ///
+    /// # Errors
+    /// As [`Scene::cut`]; [`crate::Error::Argument`] for a stretch that is not above 1.
+    pub fn tear(&self, stroke: u32, stretch: f32, most: u32) -> Result<Cut> {
+        let _frames = self.hold_frames(true)?;
+        let line = Line::Tear(lines::Tear {
+            stroke,
+            stretch,
+            most,
+        });
+        let line = |recorder: &mut Recorder| recorder.open(&line);
+        let change = self.told(line, |core, published| {
+            core.change(published, |body, at| {
+                body.tear(f64::from(stretch), most as usize, stroke, at)
+            })
+        });
+        change.map(Cut::from)
+    }
+
     /// Multiplies the stiffness of elements of the intact mesh: coagulation, oedema, softening.
     ///
     /// # Errors

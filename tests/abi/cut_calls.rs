@@ -60,6 +60,16 @@ impl World<'_> {
                         upt_scene_remove(scene, tool, most, place),
                     )
                 }
+                Function::Tear => {
+                    let stretch = match call.odd {
+                        Odd::NaN => f32::NAN,
+                        Odd::Wrong => 0.5,
+                        _ => 1.05 + 0.1 * random.next(4) as f32,
+                    };
+                    let most = random.next(4) as u32;
+                    let status = upt_scene_tear(scene, 9, stretch, most, place);
+                    ("upt_scene_tear", status)
+                }
                 Function::ScaleStiffness => {
                     let elements = [
                         0,

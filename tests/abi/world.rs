@@ -198,7 +198,9 @@ impl<'a> World<'a> {
             Instruments | Readings | InstrumentContacts | HullCreate | HullDestroy => {
                 self.call_instruments(call, scene, nodes)
             }
-            Cut | CutWith | Remove | ScaleStiffness | DropFragments => self.call_cuts(call, scene),
+            Cut | CutWith | Remove | Tear | ScaleStiffness | DropFragments => {
+                self.call_cuts(call, scene)
+            }
             NodeCount | UpdateSurface | Surface | SurfacePositions => {
                 self.call_surface(call, scene)
             }

@@ -168,6 +168,9 @@ static void cuts(const char *bundle) {
   EXPECT_TRUE(std::fabs(at[0] - rest[0] - field[0]) < 1e-4F);
   upt_cut out;
   const std::uint32_t elements[1] = {0};
+  EXPECT(scene.tear(1, 5.0F, 4, out), UPT_OK);
+  EXPECT_TRUE(out.area_mm2 == 0 && out.is_changed == 0);
+  EXPECT_TRUE(thrown([&] { scene.tear(1, 1.0F, 4, out); }) == UPT_ERR_ARGUMENT);
   EXPECT(scene.scale_stiffness(elements, 2.0F, out), UPT_OK);
   EXPECT(scene.drop_fragments(out), UPT_OK);
   upt_instrument tip = upt::sphere(2.0F);

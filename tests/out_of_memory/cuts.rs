@@ -27,6 +27,10 @@ impl Rig {
         self.operate(|scene, out| unsafe { upt_scene_remove(scene, &tool, 20.0, out) })
     }
 
+    pub fn tear(&mut self) -> i32 {
+        self.operate(|scene, out| unsafe { upt_scene_tear(scene, 5, 1.02, 4, out) })
+    }
+
     pub fn stiffen(&mut self) -> i32 {
         self.operate(|scene, out| unsafe {
             upt_scene_scale_stiffness(scene, [0, 1].as_ptr(), 2, 2.0, out)

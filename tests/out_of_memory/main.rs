@@ -40,7 +40,9 @@ fn least(call: &str) -> usize {
         "upt_haptics_create" => 1536,
         "upt_scene_attach_points" => 1024,
         // A model is made for the body, of many hundred lists: those that are as long as the mesh are refused.
-        "upt_scene_cut" | "upt_scene_remove" | "upt_scene_scale_stiffness" => 8192,
+        "upt_scene_cut" | "upt_scene_remove" | "upt_scene_tear" | "upt_scene_scale_stiffness" => {
+            8192
+        }
         _ if call.contains("cut") || call.contains("surface") => 8192,
         _ => 512,
     }

@@ -60,6 +60,7 @@ pub const CUT: &[Call] = &[
     ("a step of a cut body", |rig| rig.drive(1.5)),
     ("upt_scene_save of a cut body", Rig::save),
     ("upt_scene_remove", Rig::remove),
+    ("upt_scene_tear", Rig::tear),
     ("upt_scene_scale_stiffness", Rig::stiffen),
     ("upt_scene_restore of a cut body", Rig::restore),
     ("upt_scene_reset of a cut body", Rig::reset),

@@ -195,6 +195,8 @@ const tests = {
     assert.throws(() => scene.cut([edge(0), edge(0)]), refused("UPT_ERR_ARGUMENT", /sweeps no area/));
     const taken = scene.remove({ shape: "sphere", position: [x, y, z], radius: 5 }, 30);
     assert.ok(Math.abs(taken.removed_mm3 - 30) < 3 && scene.updateSurface().changed.length > 0);
+    assert.equal(scene.tear(5).is_changed, 0);
+    assert.throws(() => scene.tear(0.5), refused("UPT_ERR_ARGUMENT", /above 1/));
     assert.equal(scene.scaleStiffness([0, 1, 2], 4).is_changed, 1);
     scene.restore(before);
     assert.equal(scene.nodeCount, nodes);

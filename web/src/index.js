@@ -231,6 +231,11 @@ class Scene {
     return this.#operate((out) => this.#module.run("upt_scene_remove", this.handle, this.#tools.at, mostMm3, out));
   }
 
+  /** Parts tissue that is longer than so many times its length at rest, before a step: a tear grows as the tissue gives way. */
+  tear(stretch, { most = 16, stroke = 0 } = {}) {
+    return this.#operate((out) => this.#module.run("upt_scene_tear", this.handle, stroke, stretch, most, out));
+  }
+
   /** Multiplies the stiffness of elements of the intact mesh. */
   scaleStiffness(elements, factor) {
     const run = (at, out) => this.#module.run("upt_scene_scale_stiffness", this.handle, at, BigInt(elements.length), factor, out);

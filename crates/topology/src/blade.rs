@@ -78,7 +78,7 @@ impl Body {
         }
         let mut next = self.clone();
         let mut opened = Vec::new();
-        let mut change = next.cut_in_place(sweep, stroke, positions, &mut opened)?;
+        let mut change = next.cut_in_place(sweep, (stroke, None), positions, &mut opened)?;
         let way = sweep.way();
         let square = dot(way, way);
         if blade.energy > 0.0 && square > 0.0 {

@@ -37,10 +37,11 @@ impl Body {
         self.cut_with(&Blade::default(), sweep, stroke, positions)
     }
 
+    /// As [`Body::cut`], and not whole where it fails; the element `torn` parts wherever its nodes have the cut, though the sweep does not reach it there.
     pub(crate) fn cut_in_place(
         &mut self,
         sweep: &Sweep,
-        stroke: u32,
+        (stroke, torn): (u32, Option<u32>),
         positions: &[Point],
         parts: &mut Vec<Opened>,
     ) -> Result<Change, TopologyError> {
@@ -76,8 +77,11 @@ impl Body {
                     continue;
                 };
                 let points: Vec<Point> = (met.cut.iter()).map(|at| place(at, &corners)).collect();
-                let area = sweep.overlap(&points, edge);
                 let whole = length(crate::polygon::normal(&points));
+                let area = match torn == Some(element) {
+                    true => whole,
+                    false => sweep.overlap(&points, edge),
+                };
                 // Both sides have the cut; it is counted once.
                 if met.counts && area > 0.0 {
                     all += whole;

@@ -44,6 +44,9 @@ pub enum TopologyError {
     /// A stiffness that no element may have.
     #[error("a stiffness factor of {factor} is not between 0.001 and 1000")]
     Factor { factor: f32 },
+    /// A stretch at which tissue at rest would part.
+    #[error("tissue that tears at {stretch} times its length; give a number above 1, such as 1.5")]
+    Stretch { stretch: f64 },
     /// Nothing would be left.
     #[error("nothing of the body would be left; remove less")]
     NothingLeft,

@@ -14,6 +14,7 @@
 //! | [`elements`] | what a solver takes: nodes, shares and stiffness of each cell |
 //! | [`surface`] | the closed surface, inside faces included; what outside pressure acts on |
 //! | [`blade`] | what a blade feels |
+//! | `tear` | what is stretched too far |
 //! | `carry` | which nodes take what acts on a node of the mesh |
 //! | `touchable` | faces that tools may touch |
 //!
@@ -38,6 +39,7 @@ pub mod rest;
 mod room;
 pub mod surface;
 pub mod sweep;
+mod tear;
 mod touchable;
 
 pub use blade::Blade;

@@ -57,6 +57,8 @@ namespace Upt.Tests
                 scene.SurfacePositions(at);
                 for (int k = 0; k < rest.Length; k++) Assert.That(at[k], Is.EqualTo(rest[k] + field[k]).Within(1e-4f));
 
+                Assert.That(scene.Tear(1, 5f, 4).area_mm2, Is.EqualTo(0f));
+                Assert.Throws<UptException>(() => scene.Tear(1, 1f, 4));
                 Assert.That(scene.ScaleStiffness(new uint[] { 0 }, 2f).node_count, Is.EqualTo((ulong)scene.NodeCount));
                 Assert.That(scene.DropFragments().node_count, Is.EqualTo((ulong)scene.NodeCount));
                 upt_instrument ball = default(upt_instrument);

@@ -1652,6 +1652,23 @@ namespace Upt.Interop
         public static extern upt_status upt_scene_remove(IntPtr scene, upt_instrument* instrument, float most_mm3, upt_cut* @out);
 
         /// <summary>
+        /// Parts tissue that is longer than `stretch` times its length at rest in some direction, across that direction as a blade would: the most stretched elements
+        /// first. Nothing tears unless this is called; called once before each step, a tear grows as the tissue gives way. What `upt_scene_cut` says of a cut scene holds.
+        ///
+        /// - `stroke`: calls with the same number are one tear that goes on, as in `upt_scene_cut`: what it has parted it does not part again.
+        /// - `stretch`: the largest principal stretch that the tissue bears, above 1; it is a property of the tissue that no bundle states.
+        /// - `most`: elements at most whose stretch starts a tear in this call; those that it touches part with them.
+        /// - `out`: what was done; set `struct_size`. `area_mm2` is what has been laid open, 0 where nothing is stretched so far.
+        ///
+        /// Threads: one at a time.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT` for a stretch that is not above 1 or more copies than
+        /// nodes, `UPT_ERR_UNSUPPORTED` as `upt_scene_cut`, `UPT_ERR_BUNDLE`, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`. The scene is then
+        /// what it was.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern upt_status upt_scene_tear(IntPtr scene, uint stroke, float stretch, uint most, upt_cut* @out);
+
+        /// <summary>
         /// Multiplies the stiffness of elements of the model's mesh: coagulation, oedema, softening. What `upt_scene_cut` says of a cut scene holds.
         ///
         /// - `elements`: `[count]` rows of `UPT_INDICES_TETS`.

@@ -80,6 +80,20 @@ namespace Upt.Interop
             return made;
         }
 
+        /// <summary>
+        /// Parts tissue that is longer than <paramref name="stretch"/> times its length at rest, across that direction as a blade would: call it
+        /// before each step, and a tear grows as the tissue gives way.
+        /// </summary>
+        public upt_cut Tear(uint stroke, float stretch, uint most)
+        {
+            upt_cut made = Blank();
+            IntPtr scene = Enter();
+            try { Status.Check(Native.upt_scene_tear(scene, stroke, stretch, most, &made)); }
+            finally { Leave(); }
+            Fit();
+            return made;
+        }
+
         /// <summary>Multiplies the stiffness of elements of the model's mesh: coagulation, oedema, softening.</summary>
         public upt_cut ScaleStiffness(uint[] elements, float factor)
         {

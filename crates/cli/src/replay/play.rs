@@ -49,6 +49,9 @@ impl Player {
             Line::Remove(remove) => {
                 scene.remove(&remove.instrument.tool(&self.hulls)?, remove.most_mm3)?;
             }
+            Line::Tear(tear) => {
+                scene.tear(tear.stroke, tear.stretch, tear.most)?;
+            }
             Line::ScaleStiffness(given) => {
                 scene.scale_stiffness(&given.elements, given.factor)?;
             }

@@ -255,6 +255,7 @@ fn operated(scene: &Scene) {
     scene.step(Contact::None, None).unwrap();
     let [hull, _] = octahedra(5.0);
     assert!(scene.remove(&tool(&hull, at), 60.0).unwrap().removed_mm3 > 1.0);
+    assert!(scene.tear(2, 1.001, 1).unwrap().is_changed);
     scene.scale_stiffness(&[0, 1, 2], 2.5).unwrap();
     scene.drop_fragments().unwrap();
     scene.step(Contact::Tools(&[]), None).unwrap();
@@ -315,6 +316,7 @@ fn all_that_a_scene_is_given_is_replayed_to_the_bit() {
         "hull",
         "cut",
         "remove",
+        "tear",
         "scale_stiffness",
         "drop_fragments",
         "reset",

@@ -54,6 +54,15 @@ impl Solver {
         self.change(|body| body.remove(depth, most_mm3, &places))
     }
 
+    /// Parts what is stretched too far: see [`Body::tear`].
+    ///
+    /// # Errors
+    /// As there; the body and its motion are then as before.
+    pub fn tear(&mut self, stretch: f64, most: usize, stroke: u32) -> Result<Change, SolverError> {
+        let places = self.places();
+        self.change(|body| body.tear(stretch, most, stroke, &places))
+    }
+
     /// Multiplies the stiffness of mesh elements: see [`Body::scale_stiffness`].
     ///
     /// # Errors

@@ -1,0 +1,166 @@
+//! Tissue that is stretched too far parts, across the direction in which it is.
+//!
+//! The largest principal stretch of a cell is the root of the largest eigenvalue of `C = F^T F`, with `F` from its corners now and at rest; the plane through
+//! its middle across `F N`, with the eigenvector `N`, parts it as a blade there would.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::body::{Body, Change};
+use crate::rest::{cross, dot, length, minus};
+use crate::room::push;
+use crate::{Point, Sweep, TopologyError};
+
+/// Half the side of what a cell's tear sweeps, of how far its corners lie from the middle: what is touched at all parts.
+const WIDE: f64 = 0.6;
+
+/// A cell that is to part.
+struct Torn {
+    stretch: f64,
+    element: u32,
+    nodes: [u32; 4],
+    /// Unit direction of its largest stretch, as it is now.
+    along: Point,
+}
+
+impl Body {
+    /// Parts what is longer than `stretch` times its length at rest in some direction, the most stretched cells first, `most` of them at most;
+    /// `positions` says where each node is now, copies included. Calls with the same `stroke` are one tear that goes on: what it has parted it does not part again.
+    ///
+    /// # Errors
+    /// A stretch that is not above 1, positions of another number of nodes or not finite, more copies than there is room for; nothing has then changed.
+    pub fn tear(
+        &mut self,
+        stretch: f64,
+        most: usize,
+        stroke: u32,
+        positions: &[Point],
+    ) -> Result<Change, TopologyError> {
+        if !stretch.is_finite() || stretch <= 1.0 {
+            return Err(TopologyError::Stretch { stretch });
+        }
+        self.check(positions)?;
+        let mut torn = self.stretched(stretch, stroke, positions)?;
+        torn.sort_by(|a, b| {
+            b.stretch
+                .total_cmp(&a.stretch)
+                .then(a.element.cmp(&b.element))
+        });
+        let (mut next, mut change) = (self.clone(), Change::default());
+        let mut places = crate::room::copied(positions)?;
+        let mut left = most;
+        for one in torn {
+            // What one cell's tear has parted or given other nodes is looked at in the next call, where the tissue has come to.
+            let cells = next.cells(one.element);
+            let is_there = (cells.iter()).any(|cell| {
+                cell.is_alive && cell.nodes == one.nodes && cell.side_of(stroke).is_none()
+            });
+            if left == 0 || !is_there {
+                continue;
+            }
+            let sweep = across(&one.nodes.map(|node| places[node as usize]), one.along)?;
+            let own = next.cut_in_place(
+                &sweep,
+                (stroke, Some(one.element)),
+                &places,
+                &mut Vec::new(),
+            )?;
+            for &copied in &own.copied {
+                let place = places[copied as usize];
+                push(&mut places, place)?;
+                push(&mut change.copied, copied)?;
+            }
+            for element in own.elements {
+                push(&mut change.elements, element)?;
+            }
+            left -= usize::from(own.area_mm2 > 0.0);
+            change.area_mm2 += own.area_mm2;
+        }
+        change.elements.sort_unstable();
+        change.elements.dedup();
+        *self = next;
+        Ok(change)
+    }
+
+    /// Living cells that are stretched by more than `stretch` and that `stroke` has not parted.
+    fn stretched(
+        &self,
+        stretch: f64,
+        stroke: u32,
+        positions: &[Point],
+    ) -> Result<Vec<Torn>, TopologyError> {
+        let mut found = Vec::new();
+        let mut look = |element: u32, nodes: [u32; 4]| -> Result<(), TopologyError> {
+            let rest = self
+                .mesh()
+                .tet(element)
+                .map(|node| self.mesh().position(node));
+            let now = nodes.map(|node| positions[node as usize]);
+            if let Some((own, along)) = largest_stretch(rest, now, stretch) {
+                let torn = Torn {
+                    stretch: own,
+                    element,
+                    nodes,
+                    along,
+                };
+                push(&mut found, torn)?;
+            }
+            Ok(())
+        };
+        for element in 0..self.mesh().element_count() as u32 {
+            match self.cells.get(&element) {
+                None => look(element, self.mesh().tet(element))?,
+                Some(cells) => {
+                    let is_open =
+                        |cell: &&crate::Cell| cell.is_alive && cell.side_of(stroke).is_none();
+                    for cell in cells.iter().filter(is_open) {
+                        look(element, cell.nodes)?;
+                    }
+                }
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// The largest principal stretch of a tetrahedron and its direction now; none where it is not above `least`.
+fn largest_stretch(rest: [Point; 4], now: [Point; 4], least: f64) -> Option<(f64, Point)> {
+    let edges = |[a, b, c, d]: [Point; 4]| {
+        let columns = [b, c, d].map(|corner| Vector3::from(minus(corner, a)));
+        Matrix3::from_columns(&columns)
+    };
+    let f = edges(now) * edges(rest).try_inverse()?;
+    let c = f.transpose() * f;
+    // No eigenvalue is above the largest sum of a row: most cells end here.
+    let bound = (c.row_iter()).map(|row| row.iter().map(|x| x.abs()).sum::<f64>());
+    if bound.fold(0.0, f64::max) <= least * least {
+        return None;
+    }
+    let eigen = c.symmetric_eigen();
+    let place = eigen.eigenvalues.imax();
+    let stretch = eigen.eigenvalues[place].sqrt();
+    let along = (f * eigen.eigenvectors.column(place)).normalize();
+    (stretch > least).then(|| (stretch, along.into()))
+}
+
+/// A square through the middle of a tetrahedron across a direction: it parts the cell, and those beside it that it reaches.
+fn across(corners: &[Point; 4], along: Point) -> Result<Sweep, TopologyError> {
+    let middle = crate::polygon::middle(corners);
+    let least = [0, 1, 2]
+        .into_iter()
+        .min_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs()));
+    let mut axis = [0.0; 3];
+    axis[least.unwrap_or(0)] = 1.0;
+    let side = cross(along, axis);
+    let side = side.map(|x| x / length(side));
+    let other = cross(along, side);
+    let wide = corners.iter().map(|corner| {
+        let away = minus(*corner, middle);
+        dot(away, side).abs().max(dot(away, other).abs())
+    });
+    let wide = WIDE * wide.fold(0.0, f64::max);
+    let at = |a: f64, b: f64| [0, 1, 2].map(|k| middle[k] + wide * (a * side[k] + b * other[k]));
+    Sweep::new(&[
+        vec![at(-1.0, -1.0), at(1.0, -1.0)],
+        vec![at(-1.0, 1.0), at(1.0, 1.0)],
+    ])
+}
