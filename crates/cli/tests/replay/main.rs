@@ -30,6 +30,7 @@ fn inputs() -> String {
     let mut text = String::from(
         r#"{"upt_replay":2,"bundle":"liver-coarse","portable":true,"scene":{"step_s":0.02,"corrections":{"fixed":3}}}"#,
     );
+    fixture::find_runtime();
     let model = upt::Model::open(
         Path::new("../../onnx/liver-coarse"),
         &upt::ModelOptions::default(),

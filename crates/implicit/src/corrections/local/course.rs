@@ -74,7 +74,7 @@ impl Choice {
         self.tangent.fit(&other.tangent)
     }
 
-    /// Takes what is wanted, of which nothing has been made.
+    /// Takes what is wanted, with no part made yet.
     fn set(&mut self, wanted: Wanted<'_>, level: usize) -> Result<()> {
         (self.parts, self.asked, self.level) = (0, wanted.level as u32, level as u32);
         self.tangent.clear();

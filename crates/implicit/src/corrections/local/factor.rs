@@ -254,7 +254,7 @@ impl NearFactor {
         self.factor.solve(isa, t);
     }
 
-    /// The same of moves that follow each other, `[n, 3 C]`.
+    /// [`NearFactor::solve`] for each of the moves `[n, 3 C]`.
     pub fn solve_many(&mut self, isa: Isa, t: &mut [f32]) {
         self.factor.solve_many(isa, t);
     }

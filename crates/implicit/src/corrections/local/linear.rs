@@ -70,7 +70,7 @@ impl LinearElements {
         self.0.iter().map(|element| element.places)
     }
 
-    /// The same of one element.
+    /// The places of the corners of one element.
     pub fn places_of(&self, at: usize) -> [u32; 4] {
         self.0[at].places
     }
