@@ -61,6 +61,9 @@ if ! has_own && [ ! -e "$cross/rust/version" ] && command -v rustup >/dev/null; 
   mkdir -p "$cross"
   timeout 300 rustup target add "$triple" >"$cross/rustup.log" 2>&1 || echo "rustup cannot add $triple: taking Debian's library" >&2
 fi
+case "$triple" in
+  *-apple-darwin) source "$root/xtask/cross/macos.sh" ;;
+esac
 if ! has_own; then
   if [ ! -e "$cross/rust/version" ]; then
     unpack_debian

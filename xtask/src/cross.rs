@@ -35,7 +35,14 @@ fn of(platform: Platform) -> Option<Cross> {
             system: ["Linux", "aarch64"],
             wheel: "linux_aarch64",
         }),
-        Platform::LinuxX64 | Platform::MacosArm64 => None,
+        // Linked by LLVM's linker; CMake compiles nothing for it.
+        Platform::MacosArm64 => Some(Cross {
+            triple: "aarch64-apple-darwin",
+            prefix: "",
+            system: ["Darwin", "arm64"],
+            wheel: "macosx_11_0_arm64",
+        }),
+        Platform::LinuxX64 => None,
     }
 }
 
@@ -64,7 +71,9 @@ pub fn build(workspace: &Workspace, platform: Platform, packages: &str) -> Resul
     let triple = cross.triple;
     let words = format!("xtask/cross/cargo.sh {triple} build --release {packages}");
     let label = format!("cargo build for {}", platform.name());
-    run_checked(workspace, &label, &mut workspace.bash(&words))?;
+    let mut command = workspace.bash(&words);
+    command.env("UPT_PYTHON", workspace.venv_program("python"));
+    run_checked(workspace, &label, &mut command)?;
     Ok(workspace.path(&format!("target/cross/build/{triple}/release")))
 }
 

@@ -1,5 +1,5 @@
 //! `cargo xtask package`: a relocatable archive for C and C++ hosts, the Unity package, the wheel, and the npm package (`web.rs`). Beside each lie
-//! its bills of materials and checksums (`sbom.rs`). `crates.rs` makes what Rust's registry takes: source, with no bill of its own.
+//! its bills of materials and checksums (`sbom.rs`). `crates.rs` makes what Rust's registry takes: source, whose bill names what a build of it links.
 //!
 //! ```text
 //! libupt-VERSION-PLATFORM/
@@ -30,7 +30,7 @@ pub struct Options {
     /// Make the Python wheel instead of the archive.
     #[arg(long, conflicts_with = "unity")]
     wheel: bool,
-    /// For another platform, with its ONNX Runtime: built here for Windows and Linux arm64; for macOS laid out only. `web`: the npm package.
+    /// For another platform, with its ONNX Runtime: built here, on Linux x86-64, for Windows, Linux arm64 and macOS (which never ran). `web`: the npm package.
     /// `crates`: the library and its layers as Rust's registry takes them. `sdist`: the source as Python's does.
     #[arg(long, value_parser = wanted)]
     platform: Option<Wanted>,
@@ -61,9 +61,11 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let out = workspace.root.join(&options.out);
     std::fs::create_dir_all(&out)?;
     if let Some(Wanted::Crates) = options.platform {
-        for made in crates::package(workspace, &out)? {
-            println!("{}", made.display());
+        let made = crates::package(workspace, &out)?;
+        for package in &made {
+            println!("{}", package.display());
         }
+        sbom::write(workspace, &made)?;
         return Ok(true);
     }
     venv::create(workspace, "target/venv")?;
@@ -123,7 +125,7 @@ fn script(workspace: &Workspace, words: &str, to: &Path) -> Result<()> {
     run_checked(workspace, words, workspace.python(words).arg(to))
 }
 
-/// The archive: of this platform (its library and command stripped, also of the number that tells builds in two folders apart), of one that is built for here, or of macOS laid out without libupt.
+/// The archive: of this platform (its library and command stripped, also of the number that tells builds in two folders apart), or of one that is built for here.
 fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathBuf> {
     ensure!(
         has_program("cmake"),
@@ -135,38 +137,29 @@ fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathB
     std::fs::remove_dir_all(&root).ok();
     let is_host = Platform::host()? == platform;
     let (windows, onnx) = (platform == Platform::WindowsX64, platform.library());
+    let built = match is_host {
+        true => workspace.build().map(|()| workspace.release.clone())?,
+        false => cross::build(workspace, platform, "-p libupt -p upt-cli")?,
+    };
+    install(workspace, (!is_host).then_some(platform), &built, &root)?;
+    let program = if windows { "upt.exe" } else { "upt" };
+    let command = root.join("bin").join(program);
+    copy(&built.join(program), &command)?;
+    if is_host && cfg!(target_os = "linux") {
+        let library = root.join("lib").join(library(platform)).canonicalize()?;
+        let words = "--remove-section=.note.gnu.build-id";
+        let mut strip = workspace.command("strip", words);
+        run_checked(workspace, "strip", strip.args([&command, &library]))?;
+    }
+    if windows && !is_host {
+        cross::import_library(workspace, &built, &root.join("lib"))?;
+    }
     if platform == Platform::MacosArm64 && !is_host {
-        for header in ["include/upt.h", "include/upt.hpp"] {
-            copy(&workspace.path(header), &root.join(header))?;
-        }
-        std::fs::write(
-            root.join("INCOMPLETE.txt"),
-            "This archive was laid out on another platform and holds no libupt.\n\
-             On macOS: run `cargo build --release` and put libupt.dylib into lib/, or run `cargo xtask package` there.\n\
-             The library has not been run on macOS by its authors.\n",
-        )?;
-    } else {
-        let built = match is_host {
-            true => workspace.build().map(|()| workspace.release.clone())?,
-            false => cross::build(workspace, platform, "-p libupt -p upt-cli")?,
-        };
-        install(workspace, (!is_host).then_some(platform), &built, &root)?;
-        let program = if windows { "upt.exe" } else { "upt" };
-        let command = root.join("bin").join(program);
-        copy(&built.join(program), &command)?;
-        if is_host && cfg!(target_os = "linux") {
-            let library = root.join("lib").join(library(platform)).canonicalize()?;
-            let words = "--remove-section=.note.gnu.build-id";
-            let mut strip = workspace.command("strip", words);
-            run_checked(workspace, "strip", strip.args([&command, &library]))?;
-        }
-        if windows && !is_host {
-            cross::import_library(workspace, &built, &root.join("lib"))?;
-        }
-        #[cfg(unix)]
-        if !windows {
-            std::os::unix::fs::symlink(format!("../lib/{onnx}"), root.join("bin").join(onnx))?;
-        }
+        std::fs::write(root.join("NEVER-RUN.txt"), NEVER_RUN)?;
+    }
+    #[cfg(unix)]
+    if !windows {
+        std::os::unix::fs::symlink(format!("../lib/{onnx}"), root.join("bin").join(onnx))?;
     }
     let folder = if windows { "bin" } else { "lib" };
     copy(&ort_folder.join(onnx), &root.join(folder).join(onnx))?;
@@ -175,6 +168,10 @@ fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathB
     archive::pack(out, &name, &file, archive::time(workspace))?;
     Ok(file)
 }
+
+/// What lies in the archive for macOS that is linked on Linux.
+const NEVER_RUN: &str = "Library and command were linked for macOS on Linux, and have never run on a Mac: their authors have none.\n\
+     `cargo xtask package` on a Mac makes the same archive there.\n";
 
 /// Library, headers, CMake and pkg-config files, by CMake.
 fn install(

@@ -1,0 +1,47 @@
+# Sourced by toolchain.sh (`triple`, `cross`, `root`): macOS from Linux.
+#
+# What links is LLVM's linker of Rust's own toolchain. Of macOS it needs no more than a text that lists what the system's libraries
+# export. The package `ziglang` of PyPI carries one for libSystem, which is taken out of it; libc and libm are libSystem by other
+# names, and of libiconv three names are needed.
+if ! has_own; then
+  echo "Rust's standard library for $triple is missing, and Debian has none: rustup target add $triple" >&2
+  exit 1
+fi
+sdk="$cross/macos"
+if [ ! -e "$sdk/usr/lib/libiconv.tbd" ]; then
+  rm -rf "$sdk"
+  mkdir -p "$sdk/usr/lib" "$sdk/wheel"
+  "${UPT_PYTHON:-python3}" -m pip download --quiet --disable-pip-version-check --no-deps --dest "$sdk/wheel" ziglang==0.15.2 || {
+    echo "no ziglang 0.15.2, which lists what macOS' libSystem exports: pip's package index must have it (PIP_INDEX_URL)" >&2
+    exit 1
+  }
+  "${UPT_PYTHON:-python3}" - "$sdk" <<'PYTHON'
+import sys
+import zipfile
+from pathlib import Path
+
+sdk = Path(sys.argv[1])
+with zipfile.ZipFile(next((sdk / "wheel").glob("*.whl"))) as wheel:
+    text = wheel.read("ziglang/lib/libc/darwin/libSystem.tbd")
+for name in ("System", "c", "m"):
+    (sdk / f"usr/lib/lib{name}.tbd").write_bytes(text)
+PYTHON
+  rm -r "$sdk/wheel"
+  cat >"$sdk/usr/lib/libiconv.tbd" <<'STUB'
+--- !tapi-tbd
+tbd-version: 4
+targets: [ x86_64-macos, arm64-macos ]
+install-name: '/usr/lib/libiconv.2.dylib'
+exports:
+  - targets: [ x86_64-macos, arm64-macos ]
+    symbols: [ _iconv, _iconv_close, _iconv_open ]
+...
+STUB
+fi
+host="$(rustc -vV | sed -n 's/^host: //p')"
+UPT_MACOS_LLD="$(rustc --print sysroot)/lib/rustlib/$host/bin/rust-lld"
+export UPT_MACOS_LLD SDKROOT="$sdk"
+for arch in AARCH64 X86_64; do
+  export "CARGO_TARGET_${arch}_APPLE_DARWIN_LINKER=$root/xtask/cross/macos_ld.sh"
+  export "CARGO_TARGET_${arch}_APPLE_DARWIN_RUSTFLAGS=-Clinker-flavor=ld64.lld"
+done
