@@ -62,8 +62,6 @@ KINDS = [
     Kind("libupt-{v}-py3-none-win_amd64.whl", ("upt/lib/upt.dll", ORGAN), (WINDOWS, LEARNED), (COMMAND,)),
     Kind("libupt-{v}-py3-none-macosx_11_0_arm64.whl", ("upt/lib/libupt.dylib", ORGAN), (LEARNED,), (X86, WINDOWS)),
     Kind("libupt-{v}.tar.gz", ("p/organs/liver-coarse/bundle.json",), (LEARNED, "liver-coarse"), (COMMAND,)),
-    Kind("libupt-{v}.crate", ("p/examples/block/bundle.json",), (LEARNED, "block"), (COMMAND,)),
-    Kind("libupt-lanes-{v}.crate", ("p/src/lib.rs",), ("libupt-lanes",), (LEARNED, "libupt")),
 ]
 
 

@@ -5,6 +5,16 @@ crates="$work/crates"
 mkdir -p "$crates/user/src/bin" "$crates/user/.cargo"
 check crates bash -c "cd '$root' && cargo xtask package --platform crates --out '$work/dist-crates'"
 
+crate_bills() {
+  local file
+  for file in "$work"/dist-crates/*.crate; do
+    [ -s "$file.cdx.json" ] && [ -s "$file.spdx.json" ] || { echo "$file has no bill"; return 1; }
+  done
+  # What a build of the library links; the lanes alone know nothing of it.
+  grep -q '"name": "ort"' "$work"/dist-crates/libupt-[0-9]*.cdx.json && ! grep -q '"name": "ort"' "$work"/dist-crates/libupt-lanes-*.cdx.json
+}
+check crate_bills crate_bills
+
 unpack_crates() {
   local file
   for file in "$work"/dist-crates/*.crate; do tar -xzf "$file" -C "$crates" || return 1; done
