@@ -9,7 +9,7 @@ use super::maker::StepMaker;
 use super::published::Published;
 use super::published::lock_read;
 use super::timing::Stopwatch;
-use crate::corrections::{Enough, Input};
+use crate::corrections::Input;
 use crate::error::Result;
 use crate::stats::SceneStats;
 
@@ -47,9 +47,6 @@ impl StepMaker {
         let load = self.loads.load();
         // A length of step of the scene's own may be short enough to need no substeps. Under a load that acts everywhere iterations are worth more.
         let in_parts = (parts.free_substeps > 1 || !*own_pace) && load.is_none();
-        if !touched && !learns && in_parts {
-            parts.be_shorter(context, &self.body.model)?;
-        }
         let shared = lock_read(published);
         let input = Input {
             rest: &self.body.mesh.positions,
@@ -62,22 +59,33 @@ impl StepMaker {
             enough: match load {
                 // What the whole body does settles later than an iteration's own step says.
                 // Whole modes know what it does.
-                Some(_) if !context.corrections.has_whole_modes() => Enough {
-                    error_mm: 0.0,
-                    ..enough
-                },
+                Some(_) if !context.corrections.has_whole_modes() => enough.all(),
+                // Nor do they say what is out of balance about a group that is led or let go.
+                _ if self.loads.leads() => enough.all(),
                 _ => enough,
             },
         };
+        // What has been let go springs back within less than a step of 50 ms.
+        let springs = context.held.let_go != 0 && context.held.stands(input.last);
+        let in_parts = in_parts || (springs && parts.most_substeps > 1);
         let next = &mut states.next.field;
         let report = if touched {
             Some(solver.correct(context, &input, next)?)
-        } else if !learns {
-            let substepper = parts.substepper.as_deref_mut().filter(|_| in_parts);
-            Some(solver.swing(context, &input, substepper, next)?)
-        } else {
+        } else if learns {
             solver.follow(context, &input, next)?;
             None
+        } else {
+            if in_parts {
+                parts.be_shorter(context, &self.body.model)?;
+            }
+            let limit_mm = parts.limit_mm;
+            let substepper = parts.substepper.as_deref_mut().filter(|_| in_parts);
+            Some(match (springs, substepper) {
+                (true, Some(own)) => {
+                    solver.swing_where_it_helps(context, &input, (own, limit_mm), next)?
+                }
+                (_, own) => solver.swing(context, &input, own, next)?,
+            })
         };
         if let Some(report) = report {
             corrected.report_to(&report, stats);

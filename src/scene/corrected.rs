@@ -69,7 +69,7 @@ pub struct StepParts {
     /// The solver of steps in parts, made at the first step that needs it.
     pub substepper: Option<Box<Substepper>>,
     /// An estimate above it asks for substeps, mm.
-    limit_mm: f32,
+    pub(super) limit_mm: f32,
 }
 
 impl StepParts {

@@ -114,11 +114,15 @@ impl StepMaker {
             still: false,
             load: self.loads.load(),
             way: [0.0, 1.0],
-            enough,
+            // What an iteration near the tools moves does not say what is out of balance about a group that is led or let go.
+            enough: match self.loads.leads() {
+                true => enough.all(),
+                false => enough,
+            },
         };
-        // A support group ends where it is led in one step.
+        // A support group ends where it is led in one step; what has been let go springs back, and more so than a step of 50 ms can follow.
         let parts = (parts.substeps.as_deref_mut()).zip(parts.substepper.as_deref_mut());
-        let parts = parts.filter(|_| !self.loads.leads());
+        let parts = parts.filter(|_| !self.loads.leads() || context.held.stands(input.last));
         let report = solver.drive(context, &input, problem, parts, &mut states.next.field)?;
         corrected.report_to(&report, stats);
         drop(shared);

@@ -201,6 +201,8 @@ fn a_liver_is_mobilised_as_in_the_truth() {
     println!("{mse:e} mm² (worst {worst:e}), the ligament {farthest:.1} mm");
     assert!(farthest > 5.0, "{farthest} mm");
     assert!(mse < 0.005, "{mse:e} mm²");
+    // In the step of the release, which takes substeps; 0.25 without.
+    assert!(worst < 0.15, "{worst:e} mm²");
 }
 
 /// Nightly: it takes the solver a minute.
@@ -216,6 +218,5 @@ fn a_tool_feels_a_liver_that_is_mobilised() {
         100.0 * force
     );
     assert!(mse < 0.005, "{mse:e} mm²");
-    // The bar of 0.06 is missed: for some steps after the release, which BDF2 takes for slower than it is.
-    assert!(force < 0.08, "force {force}");
+    assert!(force < 0.06, "force {force}");
 }

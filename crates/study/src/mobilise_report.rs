@@ -3,6 +3,7 @@
 //!
 //! The bundle's held nodes become two groups here, the third of them that is farthest along x and the rest. Both sides hold the group again where they have it then.
 
+use std::cmp::Ordering;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -85,11 +86,17 @@ fn in_groups(path: &Path, held: &[u32], mesh: &Mesh, to: &Path) -> Result<Vec<u3
             }
         }
     }
-    let x = |node: &u32| mesh.positions[*node as usize][0];
-    let mut places: Vec<f32> = held.iter().map(x).collect();
-    places.sort_by(f32::total_cmp);
-    let at = places[2 * places.len() / 3];
-    let (rest, group): (Vec<u32>, Vec<u32>) = held.iter().partition(|node| x(node) < at);
+    // Of nodes in one plane, as a brain's are that is held at its middle, the coordinates that follow decide.
+    let place = |node: &u32| mesh.positions[*node as usize];
+    let mut rest = held.to_vec();
+    rest.sort_by(|a, b| {
+        let pairs = place(a).into_iter().zip(place(b));
+        let ordered = pairs.map(|(a, b)| a.total_cmp(&b));
+        ordered.fold(Ordering::Equal, Ordering::then)
+    });
+    let mut group = rest.split_off(2 * held.len() / 3);
+    rest.sort_unstable();
+    group.sort_unstable();
     let mut manifest = Manifest::read(to)?;
     let groups = json!([{"name": "bed", "nodes": rest}, {"name": "ligament", "nodes": group}]);
     manifest.set("supports", &groups, "prior")?;

@@ -46,6 +46,13 @@ impl Held {
         }
     }
 
+    /// Whether all of what is held is where it was in `u [K,3]`.
+    pub fn stands(&self, u: &[f32]) -> bool {
+        let rows = u.as_chunks::<3>().0;
+        let mut held = self.nodes.iter().enumerate();
+        held.all(|(index, node)| rows[*node as usize] == self.place(index))
+    }
+
     /// Where the node at `index` of `nodes` ends.
     pub(super) fn place(&self, index: usize) -> [f32; 3] {
         let places = self.places.as_chunks::<3>().0;

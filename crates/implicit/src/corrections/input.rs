@@ -81,6 +81,16 @@ pub struct Enough {
     pub until: Option<Instant>,
 }
 
+impl Enough {
+    /// All iterations that there may be, and time is for.
+    pub fn all(self) -> Enough {
+        Enough {
+            error_mm: 0.0,
+            ..self
+        }
+    }
+}
+
 /// What a scene lends.
 #[derive(Clone, Copy)]
 pub struct SolverContext<'a> {

@@ -191,6 +191,28 @@ impl Substepper {
 }
 
 impl ImplicitSolver {
+    /// Makes the free step from `input.last`, of shorter ones where a whole one leaves out more than `limit_mm`, or the last one did.
+    ///
+    /// # Errors
+    /// A panic on another thread of the pool; the past of the solver stays.
+    pub fn swing_where_it_helps(
+        &mut self,
+        context: SolverContext<'_>,
+        input: &Input<'_>,
+        (substepper, limit_mm): (&mut Substepper, f32),
+        next: &mut [f32],
+    ) -> Result<Report> {
+        if self.motion.truncated_mm > limit_mm {
+            return self.swing(context, input, Some(substepper), next);
+        }
+        let whole = self.swing(context, input, None, next)?;
+        if whole.fell_back || self.next.truncated_mm <= limit_mm {
+            return Ok(whole);
+        }
+        let parts = self.swing(context, input, Some(substepper), next)?;
+        Ok(whole.and(&parts))
+    }
+
     /// Makes the free step from `input.last`, of shorter ones where the scene has them for that; each with at least `LEAST_SWING` iterations
     /// that its time lets in.
     ///
