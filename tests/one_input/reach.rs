@@ -11,7 +11,7 @@ use tissue::solver::SolverOptions;
 use upt::contact::Tool;
 use upt::{Contact, Corrections, Loads, Model, ModelOptions, Scene, SceneOptions, StepInput};
 
-use crate::fixture::find_runtime;
+use fixture::find_runtime;
 
 /// Before the tool slips.
 const STEPS: usize = 18;
