@@ -82,7 +82,7 @@ impl StepMaker {
             let substepper = parts.substepper.as_deref_mut().filter(|_| in_parts);
             Some(match (springs, substepper) {
                 (true, Some(own)) => {
-                    solver.swing_where_it_helps(context, &input, (own, limit_mm), next)?
+                    own.swing_where_it_helps(solver, context, &input, limit_mm, next)?
                 }
                 (_, own) => solver.swing(context, &input, own, next)?,
             })

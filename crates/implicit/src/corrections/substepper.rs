@@ -190,29 +190,32 @@ impl Substepper {
     }
 }
 
-impl ImplicitSolver {
-    /// Makes the free step from `input.last`, of shorter ones where a whole one leaves out more than `limit_mm`, or the last one did.
+impl Substepper {
+    /// Makes the free step from `input.last` with `solver`, of shorter ones where a whole one leaves out more than `limit_mm`, or the last one did.
     ///
     /// # Errors
     /// A panic on another thread of the pool; the past of the solver stays.
     pub fn swing_where_it_helps(
         &mut self,
+        solver: &mut ImplicitSolver,
         context: SolverContext<'_>,
         input: &Input<'_>,
-        (substepper, limit_mm): (&mut Substepper, f32),
+        limit_mm: f32,
         next: &mut [f32],
     ) -> Result<Report> {
-        if self.motion.truncated_mm > limit_mm {
-            return self.swing(context, input, Some(substepper), next);
+        if solver.motion.truncated_mm > limit_mm {
+            return solver.swing(context, input, Some(self), next);
         }
-        let whole = self.swing(context, input, None, next)?;
-        if whole.fell_back || self.next.truncated_mm <= limit_mm {
+        let whole = solver.swing(context, input, None, next)?;
+        if whole.fell_back || solver.next.truncated_mm <= limit_mm {
             return Ok(whole);
         }
-        let parts = self.swing(context, input, Some(substepper), next)?;
+        let parts = solver.swing(context, input, Some(self), next)?;
         Ok(whole.and(&parts))
     }
+}
 
+impl ImplicitSolver {
     /// Makes the free step from `input.last`, of shorter ones where the scene has them for that; each with at least `LEAST_SWING` iterations
     /// that its time lets in.
     ///
