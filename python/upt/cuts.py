@@ -99,7 +99,7 @@ class Cuts:
     def tear(self, stretch: float, most: int = 16, stroke: int = 0) -> Cut:
         """Parts tissue that is longer than `stretch` times its length at rest, across that direction as a blade would.
 
-        Call it before each step: a tear grows as the tissue gives way, and `Cut.area_mm2` says what it has laid open.
+        Call it before each step: a tear grows from step to step, and `Cut.area_mm2` says what it has laid open.
 
         Args:
             stretch: the largest principal stretch that the tissue bears, above 1.

@@ -133,8 +133,8 @@ impl Scene {
     }
 
     /// Parts tissue that is longer than `stretch` times its length at rest in some direction, across that direction as a blade would: the most stretched elements
-    /// first, `most` of them and what their tears touch at most. Nothing tears unless this is called; called once before each step, a tear grows as the tissue gives
-    /// way. Calls with the same `stroke` are one tear that goes on: what it has parted it does not part again.
+    /// first, `most` of them and what their tears touch at most. Nothing tears unless this is called; called once before each step, a tear grows from step to
+    /// step. Calls with the same `stroke` are one tear that goes on: what it has parted it does not part again.
     ///
     /// # Errors
     /// As [`Scene::cut`]; [`crate::Error::Argument`] for a stretch that is not above 1.

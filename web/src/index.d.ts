@@ -204,7 +204,7 @@ export interface Scene {
   cut(poses: number[][][], options?: CutOptions): Cut;
   /** Takes tissue inside of an instrument, up to so many mm³, the deepest first. */
   remove(instrument: Instrument, mostMm3: number): Cut;
-  /** Parts tissue that is longer than so many times its length at rest, before a step: a tear grows as the tissue gives way. */
+  /** Parts tissue that is longer than so many times its length at rest, before a step: a tear grows from step to step. */
   tear(stretch: number, options?: { most?: number; stroke?: number }): Cut;
   /** Multiplies the stiffness of elements of the intact mesh. */
   scaleStiffness(elements: ArrayLike<number> & Iterable<number>, factor: number): Cut;

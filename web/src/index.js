@@ -231,7 +231,7 @@ class Scene {
     return this.#operate((out) => this.#module.run("upt_scene_remove", this.handle, this.#tools.at, mostMm3, out));
   }
 
-  /** Parts tissue that is longer than so many times its length at rest, before a step: a tear grows as the tissue gives way. */
+  /** Parts tissue that is longer than so many times its length at rest, before a step: a tear grows from step to step. */
   tear(stretch, { most = 16, stroke = 0 } = {}) {
     return this.#operate((out) => this.#module.run("upt_scene_tear", this.handle, stroke, stretch, most, out));
   }

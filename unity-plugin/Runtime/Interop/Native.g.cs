@@ -1653,7 +1653,7 @@ namespace Upt.Interop
 
         /// <summary>
         /// Parts tissue that is longer than `stretch` times its length at rest in some direction, across that direction as a blade would: the most stretched elements
-        /// first. Nothing tears unless this is called; called once before each step, a tear grows as the tissue gives way. What `upt_scene_cut` says of a cut scene holds.
+        /// first. Nothing tears unless this is called; called once before each step, a tear grows from step to step. What `upt_scene_cut` says of a cut scene holds.
         ///
         /// - `stroke`: calls with the same number are one tear that goes on, as in `upt_scene_cut`: what it has parted it does not part again.
         /// - `stretch`: the largest principal stretch that the tissue bears, above 1; it is a property of the tissue that no bundle states.

@@ -82,7 +82,7 @@ namespace Upt.Interop
 
         /// <summary>
         /// Parts tissue that is longer than <paramref name="stretch"/> times its length at rest, across that direction as a blade would: call it
-        /// before each step, and a tear grows as the tissue gives way.
+        /// before each step, and a tear grows from step to step.
         /// </summary>
         public upt_cut Tear(uint stroke, float stretch, uint most)
         {

@@ -112,6 +112,11 @@ impl<'a> SolverContext<'a> {
         groups.filter_map(move |(at, group)| (let_go >> at & 1 != 0).then_some(group))
     }
 
+    /// Whether loads move all of the body, and no whole modes know how.
+    pub(super) fn moves_all(&self, input: &Input<'_>) -> bool {
+        input.load.is_some() && !self.corrections.has_whole_modes()
+    }
+
     /// What products with fields need of it.
     pub(super) fn env(&self) -> Env<'a> {
         Env {

@@ -167,7 +167,7 @@ impl FieldStep<'_> {
 impl ImplicitSolver {
     /// What loads and what is held ask of a step, before it begins.
     pub(super) fn expect(&mut self, context: SolverContext<'_>, input: &Input<'_>) -> Result<()> {
-        self.stand_on(context.held.let_go);
+        self.groups.stand_on(context.held.let_go, &mut self.local);
         if self.groups.before != self.groups.now {
             // The pairs are those of another boundary, also where the step is made again.
             self.clear_pairs();

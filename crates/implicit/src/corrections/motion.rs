@@ -36,6 +36,15 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// How far from the tools the next step iterates. What `moves_all` of the body brings all of it near: in a narrower set, what the modes near the tools do not
+    /// span of it would gather from step to step, the faster the shorter the steps.
+    pub(super) fn reach(&self, moves_all: bool) -> usize {
+        match moves_all {
+            true => LEVELS - 1,
+            false => self.level as usize,
+        }
+    }
+
     /// No velocity and no inertia, of a body of `len` degrees of freedom.
     pub(super) fn at_rest(len: usize) -> Result<Motion> {
         Ok(Motion {

@@ -52,6 +52,18 @@ pub(super) struct LetGo {
     pub before: u64,
 }
 
+impl LetGo {
+    /// What is near is that of a boundary of which these groups are let go.
+    pub(super) fn stand_on(&mut self, let_go: u64, local: &mut Option<Box<LocalSolver>>) {
+        if self.now != let_go
+            && let Some(local) = local
+        {
+            local.leave_boundary();
+        }
+        self.now = let_go;
+    }
+}
+
 impl ImplicitSolver {
     /// Buffers of a scene at rest.
     ///
@@ -88,16 +100,6 @@ impl ImplicitSolver {
             local.coming.clear();
         }
         self.commit_pairs();
-    }
-
-    /// What is near is that of a boundary of which these groups are let go.
-    pub(super) fn stand_on(&mut self, let_go: u64) {
-        if self.groups.now != let_go
-            && let Some(local) = &mut self.local
-        {
-            local.leave_boundary();
-        }
-        self.groups.now = let_go;
     }
 
     /// Forgets the pairs, in the step being made.
@@ -190,7 +192,7 @@ impl ImplicitSolver {
         let sizes = [corrections.body.mass.len(), corrections.space.count()];
         local.iter().try_for_each(|record| record.check(sizes))?;
         self.motion.take(motion)?;
-        self.stand_on(context.held.let_go);
+        self.groups.stand_on(context.held.let_go, &mut self.local);
         self.groups.before = self.groups.now;
         match (&mut self.relaxing, relaxing) {
             (Some(own), Some(remembered)) => own.restore(remembered),

@@ -103,7 +103,7 @@ impl ToolStep<'_> {
         self.solver.expect(self.context, self.input)?;
         self.solver.prepare(self.context, self.input)?;
         self.report = Report {
-            level: rounds::level(self.context, self.input, &self.solver.motion),
+            level: (self.solver.motion).reach(self.context.moves_all(self.input)),
             ..Report::default()
         };
         // Out of the solver while they are iterated on; the host's field gets the state only once it is whole.

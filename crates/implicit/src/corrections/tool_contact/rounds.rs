@@ -4,9 +4,8 @@ use crate::clock::Instant;
 
 use super::{Iterate, ToolStep, is_sound, is_spent, sunk};
 use crate::contact::ContactProblem;
-use crate::corrections::input::{Input, SolverContext};
-use crate::corrections::local::{Base, LEVELS, LocalSolver, StepContext};
-use crate::corrections::motion::Motion;
+
+use crate::corrections::local::{Base, LocalSolver, StepContext};
 use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
 use crate::memory;
@@ -33,16 +32,6 @@ struct Made {
     size: f64,
     /// The last round ended because nothing more is asked for, and not because its base is used up.
     is_enough: bool,
-}
-
-/// How far from the tools the step after `last` iterates. A load moves all of the body, which then is near where there are no whole modes for that: in a
-/// set that is narrower, what the modes near the tools do not span of it would gather from step to step, the faster the shorter the steps.
-pub(super) fn level(context: SolverContext<'_>, input: &Input<'_>, last: &Motion) -> usize {
-    match input.load.is_some() && !context.corrections.has_whole_modes() {
-        true => LEVELS - 1,
-        // The reach of the published state, not of the round before: a step that is made again reaches as far.
-        false => last.level as usize,
-    }
 }
 
 impl ToolStep<'_> {
@@ -156,7 +145,9 @@ impl ToolStep<'_> {
     /// Makes `at` the base of local iterations.
     pub(super) fn begin_round(&mut self, at: &Iterate<'_>) -> Result<()> {
         let env = self.context.env();
-        let level = level(self.context, self.input, &self.solver.motion);
+        // The reach of the published state, not of the round before: a step that is made again reaches as far.
+        let moves_all = self.context.moves_all(self.input);
+        let level = self.solver.motion.reach(moves_all);
         let (local, mut step, problem) = self.local_solver()?;
         let nodes = problem.reached(&env.held.is);
         local.reach.level = level;
