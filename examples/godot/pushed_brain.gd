@@ -4,6 +4,8 @@
 #   --corrections=N, --target=MM, --substeps=N, --step=S
 #                       the tissue's properties of these names (default: what the bundle recommends)
 #   --cut               a blade cuts a slit of 30 mm in place of the spatula's push; --check takes it back
+#   --site=X,Y,Z        the tool comes to the point of the surface that is nearest to this, mm, RAS (default: the lateral face of the brain)
+#   --bed               a ball hangs on the organ by a bed of ties in place of the spatula, and is drawn off after two seconds
 #   --breathe=MM        what holds the organ goes up and down by so much, once in four seconds
 #   --wait              each frame waits for the step in flight: the same pictures on every machine
 #   --screenshot=FILE   PNG of the window at the deepest push (needs a display)
@@ -18,6 +20,14 @@ const ROUNDING := 1.0
 const PERIOD := 2.0
 const LATER := 0.05
 const BREATH := 4.0
+# A gall bladder, mm, on its bed: N/m and mN of all ties; and how fast it is drawn off, m/s.
+const BALL := 4
+const BLADDER := 9.0
+const BED_RADIUS := 15.0
+const BED_STIFFNESS := 300.0
+const BED_STRENGTH := 400.0
+const DRAWN_AFTER := 2.0
+const DRAWN := 0.01
 # Of a cut, and how deep.
 const BLADE := 1
 const SLIT := 0.03
@@ -35,6 +45,10 @@ var outward := Vector3.ZERO
 # Of the middle of the blade over the site, where it touches nothing yet.
 var above := 0.0
 var now := 0.0
+# Of what holds the organ, m.
+var height := 0.0
+var ties := 0
+var early := 0
 var frames := 0
 var options := {}
 var finished := false
@@ -95,14 +109,24 @@ func _process(delta: float) -> void:
 		return
 	now += delta
 	frames += 1
+	height = 0.001 * float(options.get("breathe", "0")) * (0.5 - 0.5 * cos(TAU * now / BREATH))
 	var before := spatula.position if frames > 1 else Vector3.INF
 	var press := 0.5 - 0.5 * cos(TAU * now / PERIOD)
 	var pose := Transform3D(Basis(Quaternion(Vector3.BACK, outward)), site + outward * (above - press * DEPTH))
 	if options.has("cut"):
 		var aside := outward.cross(Vector3.RIGHT).normalized() * (minf(now / (0.5 * PERIOD), 1.0) - 0.5) * SLIT
 		pose = Transform3D(Basis(Quaternion(Vector3.UP, outward)), site + aside + outward * (0.001 * HALF_EXTENTS.y - SLIT_DEPTH))
+	if options.has("bed"):
+		var drawn := DRAWN * maxf(now - DRAWN_AFTER, 0.0)
+		pose = Transform3D(Basis(), site + outward * (0.001 * BLADDER + 0.0005 + drawn) + Vector3.UP * height)
+		tissue.press(BALL, pose.origin, Quaternion(), Vector3.ZERO, BLADDER)
+		if ties == 0:
+			ties = tissue.hang(site, BED_RADIUS, BED_STIFFNESS, BED_STRENGTH)
+		if now < DRAWN_AFTER:
+			early = tissue.torn()
+	else:
+		tissue.press(SPATULA, pose.origin, pose.basis.get_rotation_quaternion(), HALF_EXTENTS, ROUNDING)
 	spatula.transform = pose
-	tissue.press(SPATULA, pose.origin, pose.basis.get_rotation_quaternion(), HALF_EXTENTS, ROUNDING)
 	var started := Time.get_ticks_usec()
 	if not tissue.frame(now):
 		finish("a frame failed: " + tissue.message())
@@ -124,7 +148,7 @@ func _process(delta: float) -> void:
 		shown = points
 	show_surface(points)
 	upload_ms = maxf(upload_ms, 0.001 * (Time.get_ticks_usec() - started))
-	if not options.has("cut"):
+	if not options.has("cut") and not options.has("bed"):
 		look(points, pose, before.distance_to(pose.origin) if before.is_finite() else 0.0)
 	if options.has("screenshot") and now >= 0.5 * PERIOD and not pictured:
 		pictured = true
@@ -170,7 +194,19 @@ func problem_of_cut() -> String:
 	return ""
 
 
+func problem_of_bed() -> String:
+	var left := ties - tissue.torn()
+	if ties < 4 or early > 0 or left > 0:
+		return "%d ties, %d torn before the ball is drawn off, %d left at the end; expected 4 and more, 0, 0" % [ties, early, left]
+	if largest_force < 100.0 or largest_force > 1000.0:
+		return "the bed bears %.0f mN at most, expected 100 to 1000" % largest_force
+	print("a ball on a bed of %d ties, all torn" % ties)
+	return ""
+
+
 func problem_of_all() -> String:
+	if options.has("bed"):
+		return problem_of_bed()
 	if options.has("cut"):
 		return problem_of_cut()
 	if most_contacts == 0:
@@ -222,11 +258,14 @@ func finish(problem: String) -> void:
 	get_tree().quit(0 if problem == "" else 1)
 
 
-# The surface point farthest to the left at mid height and a little in front: the lateral face of the brain, beside the Sylvian fissure.
+# The point that was asked for; else the surface point farthest to the left at mid height and a little in front: the lateral face of the brain, beside the Sylvian fissure.
 func find_site() -> void:
 	var best := -INF
+	var given: PackedFloat64Array = options.get("site", "").split_floats(",", false)
 	for point in rest:
 		var score := -point.x - 0.8 * absf(point.y - 0.005) - 0.5 * absf(point.z - 0.01)
+		if given.size() == 3:
+			score = -point.distance_to(0.001 * Vector3(given[0], given[2], -given[1]))
 		if score > best:
 			best = score
 			site = point
@@ -247,9 +286,15 @@ func find_site() -> void:
 
 func build_scene() -> void:
 	spatula = MeshInstance3D.new()
-	var blade := BoxMesh.new()
-	blade.size = 0.002 * HALF_EXTENTS
-	spatula.mesh = blade
+	if options.has("bed"):
+		var ball := SphereMesh.new()
+		ball.radius = 0.001 * BLADDER
+		ball.height = 0.002 * BLADDER
+		spatula.mesh = ball
+	else:
+		var blade := BoxMesh.new()
+		blade.size = 0.002 * HALF_EXTENTS
+		spatula.mesh = blade
 	var steel := StandardMaterial3D.new()
 	steel.albedo_color = Color(0.55, 0.6, 0.68)
 	steel.metallic = 0.3
@@ -261,7 +306,10 @@ func build_scene() -> void:
 	camera.near = 0.01
 	add_child(camera)
 	var middle := Vector3(0.0, 0.01, 0.02)
-	camera.look_at_from_position(middle + Vector3(-0.26, 0.1, -0.13), middle)
+	if options.has("site"):
+		camera.look_at_from_position(site + 0.2 * outward + Vector3(-0.14, 0.12, 0.0), site)
+	else:
+		camera.look_at_from_position(middle + Vector3(-0.26, 0.1, -0.13), middle)
 	for angles in [Vector3(-0.7, -1.2, 0.0), Vector3(-0.2, -2.6, 0.0)]:
 		var sun := DirectionalLight3D.new()
 		sun.rotation = angles
@@ -294,7 +342,7 @@ func show_surface(points: PackedVector3Array) -> void:
 	var deep := Color(0.2, 0.25, 0.75)
 	for i in points.size():
 		normals[i] = normals[i].normalized()
-		colors[i] = pale.lerp(deep, minf(1.0, points[i].distance_to(rest[i]) / DEPTH))
+		colors[i] = pale.lerp(deep, minf(1.0, points[i].distance_to(rest[i] + Vector3.UP * height) / DEPTH))
 	var arrays := []
 	arrays.resize(Mesh.ARRAY_MAX)
 	arrays[Mesh.ARRAY_VERTEX] = points

@@ -75,6 +75,7 @@ if grep -q '"corrections"' "$bundle/bundle.json"; then
   check target "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --corrections=20 --target=0.05 --substeps=1 --seconds=1.1 --wait --check
 fi
 check breathing "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --breathe=8 --seconds=2.5 --wait --check
+check bed "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundles/liver-coarse" --site=-18,130,17 --bed --breathe=8 --seconds=4 --wait --check
 check cut "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --cut --seconds=1.3 --wait --check
 refused() { # name message options...
   local name=$1 message=$2 status=0

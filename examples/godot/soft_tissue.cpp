@@ -6,10 +6,10 @@
  *
  * Script side: open(bundle), rest(), faces(), hold(friction, grasp, tear_off_mn), press(shape,
  * position, rotation, half_extents, radius), release(), work_as(kind), undo(),
- * breathe(amplitude, period), frame(now), wait(), changes(), outside(), cut_area(), removed(),
- * vertices(), step_ms(), contact_count(), force(), penetration(), flags(),
- * corrections_made(), error_mm(), message(). `press` and `release` say where the tool is now,
- * `frame` makes the surface of this moment; steps run on a worker meanwhile.
+ * breathe(amplitude, period), hang(place, radius, stiffness, tears_at), torn(), frame(now), wait(),
+ * changes(), outside(), cut_area(), removed(), vertices(), step_ms(), contact_count(), force(),
+ * penetration(), flags(), corrections_made(), error_mm(), message(). `press` and `release` say
+ * where the tool is now, `frame` makes the surface of this moment; steps run on a worker meanwhile.
  *
  * Properties, in the inspector too; `open` reads them: corrections (1 to 64: the most that a step
  * in contact gets, 0: what the bundle recommends, -1: none), corrections_target_mm (fewer where the
@@ -277,6 +277,15 @@ static const GodotMethod METHODS[] = {
      {{"friction", T(FLOAT)}, {"grasp", T(BOOL)}, {"tear_off_mn", T(FLOAT)}}},
     {"release", release, T(BOOL), 0, {}},
     {"breathe", breathe, T(BOOL), 2, {{"amplitude", T(FLOAT)}, {"period", T(FLOAT)}}},
+    {"hang",
+     hang,
+     T(INT),
+     4,
+     {{"place", T(VECTOR3)},
+      {"radius", T(FLOAT)},
+      {"stiffness", T(FLOAT)},
+      {"tears_at", T(FLOAT)}}},
+    {"torn", torn, T(INT), 0, {}},
     {"work_as", work_as, T(BOOL), 1, {{"kind", T(INT)}}},
     {"undo", undo, T(BOOL), 0, {}},
     {"changes", changes, T(INT), 0, {}},

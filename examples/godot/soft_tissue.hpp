@@ -39,7 +39,7 @@ inline double real(GDExtensionConstTypePtr argument) {
   return *static_cast<const double *>(argument);
 }
 
-// Calls of a tool that changes the body (cut_calls.cpp).
+// Calls of a tool that changes the body (cut_calls.cpp), and of a bed (bed_calls.cpp).
 #define UPT_CALL(name)                                                                             \
   void name(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result)
 UPT_CALL(work_as);
@@ -48,4 +48,6 @@ UPT_CALL(changes);
 UPT_CALL(outside);
 UPT_CALL(cut_area);
 UPT_CALL(removed);
+UPT_CALL(hang);
+UPT_CALL(torn);
 #undef UPT_CALL

@@ -88,11 +88,49 @@ void Tissue::breathe(float amplitude, double period) {
   period_ = period;
 }
 
+// A vector of the world in the frame of a tool: q* v q, by v + 2 q.xyz x (q.xyz x v - w v).
+static void turn_back(const float q[4], float v[3]) {
+  const float w = q[3];
+  const float c[3] = {q[1] * v[2] - q[2] * v[1] - w * v[0], q[2] * v[0] - q[0] * v[2] - w * v[1],
+                      q[0] * v[1] - q[1] * v[0] - w * v[2]};
+  const float d[3] = {q[1] * c[2] - q[2] * c[1], q[2] * c[0] - q[0] * c[2],
+                      q[0] * c[1] - q[1] * c[0]};
+  for (int k = 0; k < 3; k++) {
+    v[k] += 2 * d[k];
+  }
+}
+
+std::size_t Tissue::hang(const float place[3], float radius, float stiffness, float tears_at) {
+  if (!in_hand || kind != Kind::press) {
+    throw std::runtime_error("hang: press a tool first, to which the tissue is tied");
+  }
+  wait();
+  auto region = upt::make<upt_bed>();
+  std::copy(place, place + 3, region.centre);
+  region.centre[2] -= height_; // the library has it in the organ's frame
+  region.radius_mm = radius;
+  region.stiffness = stiffness;
+  region.break_mn = tears_at;
+  bed_ = scene_.bed(region);
+  torn_ = 0;
+  for (upt_tie &tie : bed_) {
+    for (int k = 0; k < 3; k++) {
+      tie.place[k] -= tool.position[k] - (k == 2 ? height_ : 0);
+    }
+    turn_back(tool.rotation, tie.place);
+    tie.to = UPT_END_INSTRUMENT;
+  }
+  return bed_.size();
+}
+
 // A step begins: where what holds the organ is then, and what the tool does to the body.
 void Tissue::load(upt::Input &input, double moment) {
   if (amplitude_ != 0) {
     const float position[3] = {0, 0, up(amplitude_, period_, moment)}, rotation[4] = {0, 0, 0, 1};
     input.support(position, rotation);
+  }
+  if (in_hand) {
+    input.ties(bed_); // to the tool of this step
   }
   if (surgery_.has_begun()) {
     surgery_.operate(scene_, kind, in_hand ? &tool : nullptr, step_s_);
@@ -129,6 +167,11 @@ void Tissue::frame(double now) {
   if (clock_.landed()) {
     const std::size_t in_step = clock_.landed_instruments();
     reading_ = in_step > 0 ? scene_.readings(in_step).front() : upt_instrument_reading{};
+    if (in_step > 0 && !bed_.empty()) {
+      const auto ties = scene_.tie_readings(bed_.size());
+      torn_ = static_cast<std::size_t>(std::count_if(
+          ties.begin(), ties.end(), [](const upt_tie_reading &tie) { return tie.broken != 0; }));
+    }
   }
   if (!presses) {
     std::copy(surgery_.force().begin(), surgery_.force().end(), reading_.force);

@@ -31,6 +31,11 @@ public:
   // How far up it is, mm: the displacements are in its frame.
   float height() const { return height_; }
 
+  // The tissue within `radius` mm of a place is tied to the tool, where that is now: a bed, which
+  // tears tie by tie. Of all ties together N/m and mN. How many there are.
+  std::size_t hang(const float place[3], float radius, float stiffness, float tears_at);
+  std::size_t torn() const { return torn_; }
+
   upt_instrument tool = upt::make<upt_instrument>();
   bool in_hand = false; // whether the tool is there
   Kind kind = Kind::press;
@@ -66,6 +71,8 @@ private:
   upt_instrument_reading reading_{};
   float height_ = 0, amplitude_ = 0;
   double period_ = 4;
+  std::vector<upt_tie> bed_;
+  std::size_t torn_ = 0;
   // For a bundle that cannot solve contact: what the tool pushes, found by geometry.
   bool solves_contact_ = true;
   std::vector<std::uint32_t> nodes_;
