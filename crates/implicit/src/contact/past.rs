@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the forces of instruments";
-/// See [`Past::is_wedged`].
+/// See `Past::is_wedged`.
 const WEDGED: f32 = 10.0;
 
 /// The force on one sample, mN.
@@ -92,7 +92,7 @@ impl Past {
         self.forces.iter().any(|force| force.tool != NO_TOOL)
     }
 
-    /// Whether the forces of a tool that pushed `before` hold little but each other: they are [`WEDGED`] times as large as those, and as their own sum. Two rows on
+    /// Whether the forces of a tool that pushed `before` hold little but each other: they are ten times as large as those, and as their own sum. Two rows on
     /// opposite sides of a thin tool, on tissue between which nothing yields, drive each other apart so.
     pub fn is_wedged(&self, before: &Past) -> bool {
         let all = |past: &Past, index: usize| {
