@@ -1,6 +1,8 @@
 //! The mesh before any cut.
 
-use crate::room::{copied, filled, push, room};
+use std::sync::OnceLock;
+
+use crate::room::{collected, copied, filled, push, room};
 use crate::{Point, TopologyError};
 
 /// Faces of a tetrahedron by opposite corner, outward.
@@ -18,6 +20,8 @@ pub struct RestMesh {
     /// Where the elements of each node start in `around`.
     starts: Vec<u32>,
     around: Vec<u32>,
+    /// See [`RestMesh::gradients`].
+    gradients: OnceLock<Vec<f32>>,
 }
 
 impl RestMesh {
@@ -68,6 +72,7 @@ impl RestMesh {
             tets: copied(tets)?,
             starts,
             around,
+            gradients: OnceLock::new(),
         })
     }
 
@@ -128,6 +133,25 @@ impl RestMesh {
         volume(self.tet(element).map(|node| self.position(node)))
     }
 
+    /// Of each element an upper bound of what its gradient makes of displacements, 1/mm: the Frobenius norm of the inverse of its edges `[b - a, c - a, d - a]`.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn gradients(&self) -> Result<&[f32], TopologyError> {
+        if let Some(known) = self.gradients.get() {
+            return Ok(known);
+        }
+        let of = |tet: &[u32; 4]| {
+            let [a, b, c, d] = tet.map(|node| self.position(node));
+            let [b, c, d] = [b, c, d].map(|corner| minus(corner, a));
+            let rows = [cross(c, d), cross(d, b), cross(b, c)];
+            let square: f64 = rows.iter().map(|row| dot(*row, *row)).sum();
+            (1.0001 * square.sqrt() / dot(b, rows[0])) as f32
+        };
+        let made = collected(self.tets.len(), self.tets.iter().map(of))?;
+        Ok(self.gradients.get_or_init(|| made))
+    }
+
     /// Mean length of the edges at a node, mm.
     pub fn edge_length(&self, node: u32) -> f64 {
         let own = self.position(node);
@@ -144,6 +168,10 @@ impl RestMesh {
             + size_of_val(self.neighbours.as_slice())
             + size_of_val(self.starts.as_slice())
             + size_of_val(self.around.as_slice())
+            + self
+                .gradients
+                .get()
+                .map_or(0, |own| size_of_val(own.as_slice()))
     }
 }
 
