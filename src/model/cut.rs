@@ -36,7 +36,7 @@ impl Model {
             ));
         };
         let intact = self.corrections()?;
-        let changes = body.changes();
+        let changes = body.changes()?;
         let mesh = self.mesh.cut(body, &changes)?;
         let own = prior.cut(&mesh, body.parents())?;
         let material = &self.manifest.step_material();

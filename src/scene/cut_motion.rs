@@ -75,11 +75,13 @@ fn element_sources(
 ) -> Result<Vec<u32>> {
     let intact = body.intact_mesh().tets.len() as u32 / 4;
     let mut sources = memory::collected(intact as usize, 0..intact, WHAT)?;
-    let cells = |body: &SceneBody| -> Vec<Element> {
-        let cut = body.cut.as_ref();
-        cut.map_or_else(Vec::new, |cut| cut.body.changes().new)
+    let cells = |body: &SceneBody| -> Result<Vec<Element>> {
+        match &body.cut {
+            Some(cut) => Ok(cut.body.changes()?.new),
+            None => Ok(Vec::new()),
+        }
     };
-    let (own, old) = (cells(body), cells(before));
+    let (own, old) = (cells(body)?, cells(before)?);
     memory::reserve(&mut sources, own.len(), WHAT)?;
     for element in &own {
         let place = origin(element, &old, |node| source(node as usize) as u32);

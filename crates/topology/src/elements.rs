@@ -1,6 +1,8 @@
 //! What a solver takes of a body: an element a living cell, with the share of volume by which its forces and its mass count.
 
+use crate::TopologyError;
 use crate::body::{Body, Cell};
+use crate::room::push;
 
 /// No cell of a cut element has less of it, in stiffness and mass alike: lighter ones blow up what iterates on them.
 pub const LEAST_SHARE: f64 = 0.1;
@@ -45,13 +47,18 @@ pub fn origin(element: &Element, before: &[Element], source: impl Fn(u32) -> u32
 
 impl Body {
     /// What is not as in the mesh.
-    pub fn changes(&self) -> Changes {
-        let gone: Vec<u32> = self.changed_elements().collect();
-        let new = gone.iter().flat_map(|element| self.elements_of(*element));
-        Changes {
-            new: new.collect(),
-            gone,
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn changes(&self) -> Result<Changes, TopologyError> {
+        let mut changes = Changes::default();
+        for element in self.changed_elements() {
+            push(&mut changes.gone, element)?;
+            for own in self.elements_of(element) {
+                push(&mut changes.new, own)?;
+            }
         }
+        Ok(changes)
     }
 
     /// All living elements: those that nothing has touched in the mesh's order, each where it was, and the cells of each touched one together.

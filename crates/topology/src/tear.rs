@@ -40,10 +40,10 @@ impl Body {
         }
         self.check(positions)?;
         let mut torn = self.stretched(stretch, stroke, positions)?;
-        torn.sort_by(|a, b| {
+        torn.sort_unstable_by(|a, b| {
             b.stretch
                 .total_cmp(&a.stretch)
-                .then(a.element.cmp(&b.element))
+                .then((a.element, a.nodes).cmp(&(b.element, b.nodes)))
         });
         let (mut next, mut change) = (self.clone(), Change::default());
         let mut places = crate::room::copied(positions)?;

@@ -32,7 +32,7 @@ impl PriorTable {
             let (_, start, rank) = self.places[copy.0 as usize];
             (start, rank)
         };
-        copies.sort_by_key(block);
+        copies.sort_unstable_by_key(|copy| (block(copy), copy.1));
         let mut block_nodes = memory::room(count, WHAT)?;
         let mut locals = memory::room(count, WHAT)?;
         let mut block_offsets = memory::room(self.block_offsets.len(), WHAT)?;

@@ -102,7 +102,7 @@ impl FarField {
     /// Volumes of a chunk and of what its elements have become, and which nodes' displacements change their mean gradient.
     fn take_anew(&mut self, packed: &Packed<'_>) -> Result<()> {
         let forces = &packed.body.forces;
-        let mut sums: Vec<(u32, [f64; 3])> = Vec::new();
+        let mut sums: Vec<(u32, usize, [f64; 3])> = Vec::new();
         let (mut whole, mut largest) = (0.0, 0.0f64);
         for chunk in packed.chunks() {
             let nodes = forces.chunk_nodes(chunk);
@@ -117,18 +117,18 @@ impl FarField {
                     largest = part
                         .iter()
                         .fold(largest, |most, value| most.max(value.abs()));
-                    sums.push((nodes[corner as usize], part));
+                    sums.push((nodes[corner as usize], sums.len(), part));
                 }
             }
             self.packed_volumes[chunk] = volume;
             whole += volume;
         }
         self.volumes[packed.first] = whole;
-        // In the order of the nodes, and at each of the elements.
-        sums.sort_by_key(|(node, _)| *node);
+        // In the order of the nodes, and at each of the elements; a stable sort would ask for memory, and abort without.
+        sums.sort_unstable_by_key(|(node, place, _)| (*node, *place));
         for same in sums.chunk_by(|a, b| a.0 == b.0) {
             let mut sum = [0.0; 3];
-            for (_, part) in same {
+            for (_, _, part) in same {
                 sum.iter_mut()
                     .zip(part)
                     .for_each(|(sum, part)| *sum += part);
