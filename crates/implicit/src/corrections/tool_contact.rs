@@ -37,6 +37,8 @@ use crate::error::Result;
 pub(super) const SUNK_MM: f32 = 0.9;
 /// An iteration may leave it so deep, mm.
 pub(super) const KEPT_MM: f32 = 0.5 * SUNK_MM;
+/// Tools that go less far in a step are followed in one part from the last state, mm.
+const LEAST_WAY_MM: f32 = 0.3;
 /// The response of linear elasticity is not shown where it goes farther than this, mm.
 const FARTHEST_MM: f32 = 30.0;
 /// How often the contact on the linear response is solved again where the tissue has not come out of the tools.
@@ -149,6 +151,13 @@ impl ToolStep<'_> {
         if left > SUNK_MM && is_sound(size, at.det) && self.may_begin_again() {
             // The guess has lost it: tissue that swings goes on past a small tool.
             self.begin_again(at)?;
+            if self.problem.ways.longest() > LEAST_WAY_MM {
+                // Half of the tools' way first: the whole may lose them again.
+                self.begin_round(at)?;
+                self.improve_at(at, 0.5)?;
+                self.end_round(at)?;
+                self.evaluate(at)?;
+            }
             size = self.improve_loaded(at)?;
             left = sunk(self.input, self.problem, at.u, 1.0);
         }
