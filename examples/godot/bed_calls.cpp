@@ -1,4 +1,5 @@
-// What a script asks of a bed: ties between the tissue and what the tool is, which tear one by one.
+// What a script asks of what holds the organ: a bed of ties between tissue and tool, which tear one
+// by one, and support groups.
 #include "soft_tissue.hpp"
 
 /* hang(place [m], radius [mm], stiffness [N/m], tears_at [mN]) -> int: the tissue this near to a
@@ -22,4 +23,27 @@ void torn(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr re
   auto &out = *static_cast<int64_t *>(result);
   out = 0;
   opened(instance, [&](const Tissue &tissue) { out = static_cast<int64_t>(tissue.torn()); });
+}
+
+/* lead(group, position [m], rotation, let_go): a support group of the bundle goes on from where it
+ * was meshed, as a rigid body, in every step from now on; or it holds nothing until it is led
+ * again. */
+void lead(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result) {
+  const auto *position = static_cast<const float *>(arguments[1]),
+             *rotation = static_cast<const float *>(arguments[2]);
+  put(result, opened(instance, [&](Tissue &tissue) {
+        const float metres = 0.001F;
+        auto group = upt::make<upt_support>();
+        group.group = static_cast<std::uint32_t>(*static_cast<const int64_t *>(arguments[0]));
+        group.position[0] = position[0] / metres;
+        group.position[1] = -position[2] / metres;
+        group.position[2] = position[1] / metres;
+        // The same rotation about RAS's axes.
+        group.rotation[0] = rotation[0];
+        group.rotation[1] = -rotation[2];
+        group.rotation[2] = rotation[1];
+        group.rotation[3] = rotation[3];
+        group.let_go = *static_cast<const GDExtensionBool *>(arguments[3]);
+        tissue.lead(group);
+      }));
 }

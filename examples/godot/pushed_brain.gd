@@ -6,6 +6,7 @@
 #   --cut               a blade cuts a slit of 30 mm in place of the spatula's push; --check takes it back
 #   --site=X,Y,Z        the tool comes to the point of the surface that is nearest to this, mm, RAS (default: the lateral face of the brain)
 #   --bed               a ball hangs on the organ by a bed of ties in place of the spatula, and is drawn off after two seconds
+#   --lead=MM           the bundle's first support group goes up by so much in a second, and is let go after 1.5
 #   --breathe=MM        what holds the organ goes up and down by so much, once in four seconds
 #   --wait              each frame waits for the step in flight: the same pictures on every machine
 #   --screenshot=FILE   PNG of the window at the deepest push (needs a display)
@@ -124,6 +125,11 @@ func _process(delta: float) -> void:
 			ties = tissue.hang(site, BED_RADIUS, BED_STIFFNESS, BED_STRENGTH)
 		if now < DRAWN_AFTER:
 			early = tissue.torn()
+	elif options.has("lead"):
+		var up := 0.001 * float(options["lead"]) * minf(now, 1.0)
+		if not tissue.lead(0, Vector3.UP * up, Quaternion(), now > 1.5):
+			finish("could not lead: " + tissue.message())
+			return
 	else:
 		tissue.press(SPATULA, pose.origin, pose.basis.get_rotation_quaternion(), HALF_EXTENTS, ROUNDING)
 	spatula.transform = pose
@@ -148,7 +154,14 @@ func _process(delta: float) -> void:
 		shown = points
 	show_surface(points)
 	upload_ms = maxf(upload_ms, 0.001 * (Time.get_ticks_usec() - started))
-	if not options.has("cut") and not options.has("bed"):
+	if options.has("lead"):
+		var moved := 0.0
+		for i in points.size():
+			moved = maxf(moved, points[i].distance_to(rest[i]))
+		if now <= 1.5:
+			largest = maxf(largest, moved)
+		driven = int(1e6 * moved)
+	elif not options.has("cut") and not options.has("bed"):
 		look(points, pose, before.distance_to(pose.origin) if before.is_finite() else 0.0)
 	if options.has("screenshot") and now >= 0.5 * PERIOD and not pictured:
 		pictured = true
@@ -204,7 +217,17 @@ func problem_of_bed() -> String:
 	return ""
 
 
+func problem_of_lead() -> String:
+	var led := 0.001 * float(options["lead"])
+	var left := 1e-6 * driven
+	if largest < 0.9 * led or largest > 1.5 * led or left > 0.5 * led:
+		return "the group is led %.1f mm, tissue goes %.2f mm, and is %.2f mm off once it is let go" % [1000.0 * led, 1000.0 * largest, 1000.0 * left]
+	return ""
+
+
 func problem_of_all() -> String:
+	if options.has("lead"):
+		return problem_of_lead()
 	if options.has("bed"):
 		return problem_of_bed()
 	if options.has("cut"):

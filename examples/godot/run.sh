@@ -39,7 +39,7 @@ ln -sf "$libraries/libupt.so" "$build/lib/libupt.so.0"
 libraries=$build/lib
 
 project=$build/project
-rm -rf "$project"
+rm -rf "$project" "$build/supported"
 mkdir -p "$project/bin"
 cp "$here"/project.godot "$here"/upt.gdextension "$here"/main.tscn "$here"/pushed_brain.gd "$project/"
 (cd "$build" && "$godot" --headless --dump-gdextension-interface >/dev/null 2>&1)
@@ -76,6 +76,20 @@ if grep -q '"corrections"' "$bundle/bundle.json"; then
 fi
 check breathing "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --breathe=8 --seconds=2.5 --wait --check
 check bed "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundles/liver-coarse" --site=-18,130,17 --bed --breathe=8 --seconds=4 --wait --check
+# A small body, its first held nodes a support group.
+cp -r "$root/tests/fixtures/tiny-corrected" "$build/supported"
+python3 - "$build/supported/bundle.json" <<'END'
+import json
+import sys
+
+with open(sys.argv[1]) as file:
+    manifest = json.load(file)
+del manifest["manifest_sha256"]
+manifest["supports"] = [{"name": "ligament", "nodes": list(range(0, 101, 5))}]
+with open(sys.argv[1], "w") as file:
+    json.dump(manifest, file)
+END
+check lead "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$build/supported" --lead=4 --seconds=2.2 --wait --check
 check cut "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --cut --seconds=1.3 --wait --check
 refused() { # name message options...
   local name=$1 message=$2 status=0

@@ -6,10 +6,11 @@
  *
  * Script side: open(bundle), rest(), faces(), hold(friction, grasp, tear_off_mn), press(shape,
  * position, rotation, half_extents, radius), release(), work_as(kind), undo(),
- * breathe(amplitude, period), hang(place, radius, stiffness, tears_at), torn(), frame(now), wait(),
- * changes(), outside(), cut_area(), removed(), vertices(), step_ms(), contact_count(), force(),
- * penetration(), flags(), corrections_made(), error_mm(), message(). `press` and `release` say
- * where the tool is now, `frame` makes the surface of this moment; steps run on a worker meanwhile.
+ * breathe(amplitude, period), hang(place, radius, stiffness, tears_at), torn(), lead(group,
+ * position, rotation, let_go), frame(now), wait(), changes(), outside(), cut_area(), removed(),
+ * vertices(), step_ms(), contact_count(), force(), penetration(), flags(), corrections_made(),
+ * error_mm(), message(). `press` and `release` say where the tool is now, `frame` makes the surface
+ * of this moment; steps run on a worker meanwhile.
  *
  * Properties, in the inspector too; `open` reads them: corrections (1 to 64: the most that a step
  * in contact gets, 0: what the bundle recommends, -1: none), corrections_target_mm (fewer where the
@@ -286,6 +287,14 @@ static const GodotMethod METHODS[] = {
       {"stiffness", T(FLOAT)},
       {"tears_at", T(FLOAT)}}},
     {"torn", torn, T(INT), 0, {}},
+    {"lead",
+     lead,
+     T(BOOL),
+     4,
+     {{"group", T(INT)},
+      {"position", T(VECTOR3)},
+      {"rotation", T(QUATERNION)},
+      {"let_go", T(BOOL)}}},
     {"work_as", work_as, T(BOOL), 1, {{"kind", T(INT)}}},
     {"undo", undo, T(BOOL), 0, {}},
     {"changes", changes, T(INT), 0, {}},

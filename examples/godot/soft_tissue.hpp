@@ -39,7 +39,7 @@ inline double real(GDExtensionConstTypePtr argument) {
   return *static_cast<const double *>(argument);
 }
 
-// Calls of a tool that changes the body (cut_calls.cpp), and of a bed (bed_calls.cpp).
+// Calls of a tool that changes the body (cut_calls.cpp), and of what holds it (bed_calls.cpp).
 #define UPT_CALL(name)                                                                             \
   void name(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result)
 UPT_CALL(work_as);
@@ -50,4 +50,5 @@ UPT_CALL(cut_area);
 UPT_CALL(removed);
 UPT_CALL(hang);
 UPT_CALL(torn);
+UPT_CALL(lead);
 #undef UPT_CALL

@@ -123,11 +123,24 @@ std::size_t Tissue::hang(const float place[3], float radius, float stiffness, fl
   return bed_.size();
 }
 
+void Tissue::lead(const upt_support &group) {
+  const auto known = std::find_if(groups_.begin(), groups_.end(),
+                                  [&](const upt_support &own) { return own.group == group.group; });
+  if (known != groups_.end()) {
+    *known = group;
+  } else {
+    groups_.push_back(group);
+  }
+}
+
 // A step begins: where what holds the organ is then, and what the tool does to the body.
 void Tissue::load(upt::Input &input, double moment) {
   if (amplitude_ != 0) {
     const float position[3] = {0, 0, up(amplitude_, period_, moment)}, rotation[4] = {0, 0, 0, 1};
     input.support(position, rotation);
+  }
+  if (!groups_.empty()) {
+    input.supports(groups_);
   }
   if (in_hand) {
     input.ties(bed_); // to the tool of this step

@@ -35,6 +35,8 @@ public:
   // tears tie by tie. Of all ties together N/m and mN. How many there are.
   std::size_t hang(const float place[3], float radius, float stiffness, float tears_at);
   std::size_t torn() const { return torn_; }
+  // What a support group of the bundle does in every step from now on.
+  void lead(const upt_support &group);
 
   upt_instrument tool = upt::make<upt_instrument>();
   bool in_hand = false; // whether the tool is there
@@ -73,6 +75,7 @@ private:
   double period_ = 4;
   std::vector<upt_tie> bed_;
   std::size_t torn_ = 0;
+  std::vector<upt_support> groups_;
   // For a bundle that cannot solve contact: what the tool pushes, found by geometry.
   bool solves_contact_ = true;
   std::vector<std::uint32_t> nodes_;
