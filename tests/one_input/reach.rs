@@ -30,6 +30,7 @@ fn what_turns_under_a_tool_is_followed_far_from_it() {
     let order = ToolOrder {
         load: Some((LoadProgramme::Tilt, sizes)),
         scale: ToolScale::of_body(BodySize::of(&mesh)),
+        // The least frames that a case has: it ends once they are made.
         until: Some(std::time::Instant::now()),
         ..ToolOrder::new("press".parse().unwrap(), SEED)
     };
