@@ -1,10 +1,11 @@
 // A simulator with a window: an organ that a spatula presses, a blade cuts, an aspirator takes from
 // and a coagulator hardens, stepped by libupt beside the frame.
 //
-//   simulator BUNDLE [--size WxH] [--scale MM] [--breathe]
+//   simulator BUNDLE [--size WxH] [--scale MM] [--breathe] [--hang]
 //   simulator BUNDLE --headless --frames N [--operate] [--screenshot OUT.png]
 //
-// With --breathe what holds the organ goes up and down, and the organ lags behind.
+// With --breathe what holds the organ goes up and down, and the organ lags behind. With --hang a
+// gall bladder hangs on its bed, and forceps draw it off.
 // Headless, a script plays the mouse: the spatula comes to a flat place of the domain and presses,
 // with --operate after the other tools have worked; time passes at 60 frames a second whatever the
 // machine does, so that the picture depends on N alone.
@@ -16,13 +17,14 @@
 #include <exception>
 #include <stdexcept>
 
+#include "bladder.hpp"
 #include "picture.hpp"
 #include "script.hpp"
 #include "view.hpp"
 
 struct Options {
   std::string bundle, screenshot;
-  bool headless = false, breathe = false, operate = false;
+  bool headless = false, breathe = false, operate = false, hang = false;
   long frames = -1;
   int width = 1280, height = 800;
   float scale_mm = 10;
@@ -42,6 +44,8 @@ static Options parse(int argc, char **argv) {
       options.headless = true;
     } else if (word == "--breathe") {
       options.breathe = true;
+    } else if (word == "--hang") {
+      options.hang = true;
     } else if (word == "--operate") {
       options.operate = true;
     } else if (word == "--frames") {
@@ -61,14 +65,18 @@ static Options parse(int argc, char **argv) {
     }
   }
   if (options.bundle.empty()) {
-    throw std::runtime_error("usage: simulator BUNDLE [--size WxH] [--scale MM] [--breathe] "
-                             "[--headless --frames N] [--operate] [--screenshot OUT.png]");
+    throw std::runtime_error(
+        "usage: simulator BUNDLE [--size WxH] [--scale MM] [--breathe] [--hang] "
+        "[--headless --frames N] [--operate] [--screenshot OUT.png]");
   }
   if (options.headless && options.frames < 1) {
     throw std::runtime_error("--headless needs --frames N");
   }
   if (options.operate && !options.headless) {
     throw std::runtime_error("--operate plays the mouse of a --headless run");
+  }
+  if (options.operate && (options.hang || options.breathe)) {
+    throw std::runtime_error("--operate goes with neither --hang nor --breathe");
   }
   return options;
 }
@@ -109,20 +117,24 @@ struct Window {
 };
 
 // Keys choose the tool, take back a stroke (once a press of the key) and return to rest.
-static void read_keys(const Window &window, Tissue &tissue, Kind &kind) {
+static void read_keys(const Window &window, Tissue &tissue, Bladder &bladder, Mouse &mouse) {
   static bool took_back = false;
   const Kind kinds[] = {Kind::press, Kind::blade, Kind::aspirate, Kind::coagulate};
   for (int i = 0; i < 4; i++) {
     if (window.key(GLFW_KEY_1 + i) && (i == 0 || tissue.can_be_cut())) {
-      kind = kinds[i];
+      mouse.kind = kinds[i];
+      bladder.take(false);
     }
   }
+  bladder.take(bladder.held() || window.key(GLFW_KEY_5));
+  mouse.forceps = bladder.held();
   if (window.key(GLFW_KEY_U) && !took_back) {
     tissue.undo();
   }
   took_back = window.key(GLFW_KEY_U);
   if (window.key(GLFW_KEY_R)) {
     tissue.reset();
+    bladder.reset();
   }
 }
 
@@ -153,8 +165,15 @@ static void run(const Options &options) {
   view.create(tissue, options.scale_mm);
   Spatula spatula(std::min(10.0F, tissue.info().max_push_mm));
   Cutter cutter;
+  Bladder bladder;
 
   const Hit site = tissue.flat_site();
+  if (options.hang) {
+    if (!tissue.solves_contact()) {
+      throw std::runtime_error("nothing can hang on this bundle: it has no corrections");
+    }
+    bladder.hang(tissue, site);
+  }
   Camera camera;
   // From the side of the site, along the surface a little, so that the dent is seen in profile; a
   // wound is looked into.
@@ -182,25 +201,29 @@ static void run(const Options &options) {
     Mouse mouse{};
     if (options.headless) {
       now = static_cast<double>(frame) / 60;
-      mouse = scripted(site, options.operate, frame);
+      mouse = options.hang ? drawn_off(site, frame) : scripted(site, options.operate, frame);
     } else {
       now = std::chrono::duration<double>(frame_start - start).count();
       mouse = {read_mouse(window, camera), window.button(GLFW_MOUSE_BUTTON_LEFT), cutter.kind()};
-      read_keys(window, tissue, mouse.kind);
+      read_keys(window, tissue, bladder, mouse);
     }
     const std::optional<Hit> under = tissue.pick(mouse.ray);
-    const bool presses = mouse.kind == Kind::press;
+    const bool presses = mouse.kind == Kind::press && !mouse.forceps;
     cutter.take(mouse.kind);
     cutter.hover(under);
     cutter.press(mouse.pressed);
     spatula.hover(presses ? under : std::nullopt, mouse.ray);
-    spatula.move(static_cast<float>(std::min(now - last, 0.1)), presses && mouse.pressed);
+    const auto seconds = static_cast<float>(std::min(now - last, 0.1));
+    spatula.move(seconds, presses && mouse.pressed);
+    bladder.take(mouse.forceps);
+    bladder.move(seconds, mouse.pressed);
     last = now;
 
     if (tissue.solves_contact()) {
       const std::optional<upt_instrument> tool = cutter.at_work();
       tissue.work(mouse.kind, tool ? &*tool : nullptr);
-      tissue.frame(now, spatula.instruments());
+      tissue.frame(now, bladder.with(tissue, now, spatula.instruments()));
+      bladder.read(tissue);
     } else {
       tissue.advance(now, spatula.contacts(tissue));
       tissue.sample(now);
@@ -208,7 +231,7 @@ static void run(const Options &options) {
     if (options.headless) {
       tissue.finish();
     }
-    view.draw(tissue, spatula, cutter, camera, width, height, frame_ms);
+    view.draw(tissue, spatula, cutter, bladder, camera, width, height, frame_ms);
     frame++;
     if (frame == options.frames && !options.screenshot.empty()) {
       save_picture(options.screenshot, width, height);
@@ -235,6 +258,10 @@ static void run(const Options &options) {
                 "times\n",
                 static_cast<double>(surgery.area()), static_cast<double>(surgery.removed()),
                 surgery.hardened(), static_cast<long long>(surgery.changes()));
+  }
+  if (bladder.hangs()) {
+    std::printf("a gall bladder on a bed of %zu ties: %zu torn, the others pull with %.0f mN\n",
+                bladder.ties(), bladder.torn(), static_cast<double>(bladder.pull()));
   }
   if (tissue.reading()) {
     const upt_instrument_reading &felt = *tissue.reading();

@@ -24,3 +24,7 @@ Mouse scripted(const Hit &site, bool operates, long frame) {
   }
   return {over(-6, 0), frame >= 170, Kind::press};
 }
+
+Mouse drawn_off(const Hit &site, long frame) {
+  return {{site.point + site.normal * 100, -site.normal}, frame >= 60, Kind::press, true};
+}

@@ -135,8 +135,8 @@ void Tissue::advance(double now, const Contacts &contacts) {
   }
 }
 
-static float height_at(double now) {
-  return 7.5F * (1 - std::cos(1.5707963F * static_cast<float>(now)));
+float Tissue::height_at(double now) const {
+  return breathes_ ? 7.5F * (1 - std::cos(1.5707963F * static_cast<float>(now))) : 0;
 }
 
 void Tissue::breathe() { breathes_ = true; }
@@ -148,6 +148,7 @@ void Tissue::load(upt::Input &input, double moment) {
     const float position[3] = {0, 0, height_at(moment)}, rotation[4] = {0, 0, 0, 1};
     input.support(position, rotation);
   }
+  input.ties(ties_);
   if (surgery_.has_begun()) {
     surgery_.operate(scene_, kind_, tool_ ? &*tool_ : nullptr, info_.frame_step_s);
   }
@@ -159,9 +160,10 @@ void Tissue::work(Kind kind, const upt_instrument *tool) {
   if (kind == Kind::press || surgery_.has_begun()) {
     return;
   }
-  if (breathes_ || !solves_contact_) {
-    throw std::runtime_error(breathes_ ? "no cuts while the organ breathes"
-                                       : "this bundle has no corrections: its body cannot be cut");
+  if (!can_be_cut()) {
+    throw std::runtime_error(solves_contact_
+                                 ? "no cuts while the organ breathes or something hangs on it"
+                                 : "this bundle has no corrections: its body cannot be cut");
   }
   finish();
   surgery_.begin(scene_);
@@ -204,7 +206,7 @@ bool Tissue::undo() {
 
 void Tissue::frame(double now, upt::span<const upt_instrument> instruments) {
   // The library has all of it in the organ's frame, the mouse is in the world.
-  height_ = breathes_ ? height_at(now) : 0;
+  height_ = height_at(now);
   std::vector<upt_instrument> framed(instruments.begin(), instruments.end());
   for (upt_instrument &instrument : framed) {
     instrument.position[2] -= height_;
@@ -249,8 +251,9 @@ void Tissue::finish() {
 void Tissue::count_step(std::size_t instruments) {
   const auto last = stats();
   reading_.reset();
-  if (instruments > 0) {
-    reading_ = scene_.readings(instruments).front();
+  const std::size_t tool = ties_.empty() ? 0 : 1;
+  if (instruments > tool) {
+    reading_ = scene_.readings(instruments)[tool];
   }
   counted_steps_ = last.step_count;
   step_ms_.push_back(scene_.timing().step_ms);
@@ -302,6 +305,12 @@ void Tissue::sum_normals() {
 }
 
 Vec3 Tissue::position(std::uint32_t vertex) const { return at(vertices_, vertex, STRIDE); }
+
+std::uint32_t Tissue::vertex_of(std::uint32_t node) const {
+  const auto is_there = [&](Vec3 rest) { return length(rest - nodes_[node]) == 0; };
+  return static_cast<std::uint32_t>(
+      std::distance(rest_.begin(), std::find_if(rest_.begin(), rest_.end(), is_there)));
+}
 
 std::optional<Hit> Tissue::pick(const Ray &ray) const {
   float nearest = std::numeric_limits<float>::max();

@@ -43,9 +43,9 @@ public:
   const Surgery &surgery() const { return surgery_; }
   // Whether the bundle and this build solve contact: then instruments drive the steps.
   bool solves_contact() const { return solves_contact_; }
-  // Whether tools may change the body: not while what holds it moves.
-  bool can_be_cut() const { return solves_contact_ && !breathes_; }
-  // What the tissue did to the first instrument of the last finished step; none: it had none.
+  // Whether tools may change the body: not while what holds it moves, and not while it bears a bed.
+  bool can_be_cut() const { return solves_contact_ && !breathes_ && ties_.empty(); }
+  // What the tissue did to the first tool of the last finished step; none: it had none.
   const std::optional<upt_instrument_reading> &reading() const { return reading_; }
   // Waits for the step in flight (for pictures that must not depend on the machine's speed).
   void finish();
@@ -65,8 +65,14 @@ public:
   void reset();
   // From now on what holds the organ goes up and down by 15 mm in four seconds.
   void breathe();
-  // How far up the organ's frame is, mm.
+  // How far up the organ's frame is in the last frame, and at a moment, mm.
   float height() const { return height_; }
+  float height_at(double now) const;
+  // From now on each step has these ties, on an instrument that comes before all tools.
+  void tie(const std::vector<upt_tie> &ties) { ties_ = ties; }
+  // Of the surface: where a vertex is in the last frame, and that of a node of the mesh.
+  Vec3 position(std::uint32_t vertex) const;
+  std::uint32_t vertex_of(std::uint32_t node) const;
 
   // Per surface vertex: position 3, normal 3, displacement 1, cavity 1 (above 0 in a sulcus).
   static constexpr std::size_t VERTEX_FLOATS = 8;
@@ -85,7 +91,6 @@ public:
   double median_step_ms() const;
 
 private:
-  Vec3 position(std::uint32_t vertex) const;
   void load(upt::Input &input, double moment);
   void take_surface();
   void find_rest();
@@ -119,6 +124,7 @@ private:
   std::optional<upt_instrument> tool_; // that changes the body
   std::int64_t taken_ = 0;             // of the body's surfaces, the one that is shown
   bool breathes_ = false;
+  std::vector<upt_tie> ties_;
   float height_ = 0;
   double last_start_ = -1e9;
 };

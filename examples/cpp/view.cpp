@@ -21,6 +21,8 @@ static const Vec3 STOPS[5] = {{0.85F, 0.68F, 0.64F},
                               {0.80F, 0.18F, 0.20F},
                               {0.40F, 0.05F, 0.30F}};
 
+static const Vec3 STEEL = {1, 1, 1};
+
 static const char *TISSUE_VERTEX = R"(#version 330 core
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -98,14 +100,14 @@ void main() {
 
 static const char *METAL_FRAGMENT = R"(#version 330 core
 in vec3 world, side;
-uniform vec3 eye;
+uniform vec3 eye, tint;
 out vec4 result;
 void main() {
   vec3 n = normalize(side), v = normalize(eye - world), up = vec3(0.0, 0.0, 1.0);
   vec3 key = normalize(v + 0.9 * up + 0.5 * cross(up, v));
   float shine = pow(max(dot(n, normalize(key + v)), 0.0), 24.0);
   float sky = 0.5 + 0.5 * n.z;
-  vec3 tone = mix(vec3(0.26, 0.29, 0.34), vec3(0.70, 0.74, 0.80), sky);
+  vec3 tone = mix(vec3(0.26, 0.29, 0.34), vec3(0.70, 0.74, 0.80), sky) * tint;
   result = vec4(tone * (0.35 + 0.65 * max(dot(n, key), 0.0)) + 0.6 * shine, 1.0);
 })";
 
@@ -182,6 +184,8 @@ void View::create(const Tissue &tissue, float scale_mm) {
   add_box(tube, {0, 40, 0}, {Cutter::RADIUS * 0.7F, 40, Cutter::RADIUS * 0.7F}, straight);
   tube_count_ = upload_metal(tube_, tube);
 
+  bladder_.create({3, 3});
+
   const float corners[6] = {-1, -1, 3, -1, -1, 3};
   background_.create({2});
   background_.upload(corners, sizeof corners);
@@ -201,7 +205,8 @@ static GLint uniform(GLuint program, const char *name) {
 }
 
 void View::draw(const Tissue &tissue, const Spatula &spatula, const Cutter &cutter,
-                const Camera &camera, int width, int height, double frame_ms) {
+                const Bladder &bladder, const Camera &camera, int width, int height,
+                double frame_ms) {
   const Mat4 matrix = camera.matrix();
   const Vec3 eye = camera.eye();
   gl::Viewport(0, 0, width, height);
@@ -209,17 +214,20 @@ void View::draw(const Tissue &tissue, const Spatula &spatula, const Cutter &cutt
 
   gl::Enable(GL_DEPTH_TEST);
   draw_tissue(tissue, matrix, eye);
+  if (bladder.hangs()) {
+    draw_bladder(tissue, bladder, matrix, eye);
+  }
   if (cutter.kind() == Kind::press && spatula.visible()) {
-    draw_metal(metal_, metal_count_, placed(spatula.frame(), spatula.centre()), matrix, eye);
+    draw_metal(metal_, metal_count_, placed(spatula.frame(), spatula.centre()), matrix, eye, STEEL);
   } else if (cutter.visible()) {
     const bool is_blade = cutter.kind() == Kind::blade;
     draw_metal(is_blade ? blade_ : tube_, is_blade ? blade_count_ : tube_count_,
-               placed(cutter.frame(), cutter.tip()), matrix, eye);
+               placed(cutter.frame(), cutter.tip()), matrix, eye, STEEL);
   }
   if (!tissue.surgery().has_begun()) {
     draw_ghost(tissue, matrix, eye);
   }
-  draw_numbers(tissue, spatula, cutter, width, height, frame_ms);
+  draw_numbers(tissue, spatula, cutter, bladder, width, height, frame_ms);
 }
 
 void View::draw_tissue(const Tissue &tissue, const Mat4 &matrix, Vec3 eye) {
@@ -243,13 +251,25 @@ void View::draw_tissue(const Tissue &tissue, const Mat4 &matrix, Vec3 eye) {
 }
 
 void View::draw_metal(const gl::Vertices &metal, GLsizei count, const Mat4 &place,
-                      const Mat4 &matrix, Vec3 eye) {
+                      const Mat4 &matrix, Vec3 eye, Vec3 tint) {
   gl::UseProgram(metal_program_);
   gl::UniformMatrix4fv(uniform(metal_program_, "camera"), 1, GL_FALSE, matrix.data());
   gl::UniformMatrix4fv(uniform(metal_program_, "place"), 1, GL_FALSE, place.data());
   gl::Uniform3f(uniform(metal_program_, "eye"), eye.x, eye.y, eye.z);
+  gl::Uniform3f(uniform(metal_program_, "tint"), tint.x, tint.y, tint.z);
   gl::BindVertexArray(metal.array);
   gl::DrawArrays(GL_TRIANGLES, 0, count);
+}
+
+void View::draw_bladder(const Tissue &tissue, const Bladder &bladder, const Mat4 &matrix,
+                        Vec3 eye) {
+  const auto draw = [&](const std::vector<float> &triangles, Vec3 tint) {
+    bladder_.upload(triangles.data(), triangles.size() * sizeof triangles[0]);
+    const auto count = static_cast<GLsizei>(triangles.size() / 6);
+    draw_metal(bladder_, count, identity(), matrix, eye, tint);
+  };
+  draw(bladder.ball(tissue), {0.62F, 1.0F, 0.45F});
+  draw(bladder.threads(tissue), {1.3F, 1.15F, 0.7F});
 }
 
 void View::draw_ghost(const Tissue &tissue, const Mat4 &matrix, Vec3 eye) {
@@ -296,11 +316,12 @@ std::string flag_names(std::uint32_t flags) {
 }
 
 // What the chosen tool has done to the body.
-void View::draw_work(const Tissue &tissue, const Cutter &cutter, int height) {
+void View::draw_work(const Tissue &tissue, const Cutter &cutter, const Bladder &bladder,
+                     int height) {
   static const char *const names[] = {"SPATULA", "BLADE", "ASPIRATOR", "COAGULATOR"};
   const Surgery &surgery = tissue.surgery();
   const auto &force = surgery.force();
-  std::string line = names[static_cast<int>(cutter.kind())];
+  std::string line = bladder.held() ? "FORCEPS" : names[static_cast<int>(cutter.kind())];
   if (surgery.has_begun()) {
     char work[120];
     std::snprintf(work, sizeof work, "   CUT %.0f MM2   TAKEN %.0f MM3   HARDENED %zu",
@@ -320,7 +341,7 @@ void View::draw_work(const Tissue &tissue, const Cutter &cutter, int height) {
 }
 
 void View::draw_numbers(const Tissue &tissue, const Spatula &spatula, const Cutter &cutter,
-                        int width, int height, double frame_ms) {
+                        const Bladder &bladder, int width, int height, double frame_ms) {
   const Vec3 bright = {0.92F, 0.94F, 0.96F}, dim = {0.62F, 0.68F, 0.74F};
   const upt_scene_stats stats = tissue.stats();
   char line[160];
@@ -349,7 +370,12 @@ void View::draw_numbers(const Tissue &tissue, const Spatula &spatula, const Cutt
   }
   overlay_.text(16, static_cast<float>(height) - 28, 2,
                 "LEFT: WORK   RIGHT: TURN   WHEEL: ZOOM   R: RESET", dim);
-  draw_work(tissue, cutter, height);
+  draw_work(tissue, cutter, bladder, height);
+  if (bladder.hangs()) {
+    std::snprintf(line, sizeof line, "BED %zu TIES   TORN %zu   PULL %.0f MN   5: FORCEPS",
+                  bladder.ties(), bladder.torn(), static_cast<double>(bladder.pull()));
+    overlay_.text(16, static_cast<float>(height) - 94, 2, line, bright);
+  }
 
   const float left = static_cast<float>(width) - 250, top = 16;
   for (int i = 0; i < 100; i++) {

@@ -1,6 +1,7 @@
 # Runs the simulator under a virtual display before and during a press, with tools that change the
-# body and with an organ that breathes, and compares the pictures.
-#   simulator.sh SIMULATOR COMPARE BUNDLE FOLDER
+# body, with an organ that breathes and with a gall bladder that is drawn off, and compares the
+# pictures.
+#   simulator.sh SIMULATOR COMPARE BRAIN FOLDER LIVER
 set -eu
 program=$1 compare=$2 bundle=$3 folder=$4
 show() { # NAME FRAMES OPTION...
@@ -23,5 +24,15 @@ fi
 show breathing 75 --breathe
 if cmp -s "$folder/pressed.png" "$folder/breathing.png"; then
   echo "the organ does not breathe" >&2
+  exit 1
+fi
+bundle=$5
+# While it is drawn off its bed peels, and after that none of it is left.
+for frames in 88 130; do
+  show drawn-$frames $frames --hang --breathe | tee "$folder/drawn-$frames.txt"
+done
+if ! grep -Eq '^a gall bladder on a bed of 12 ties: ([1-9]|10|11) torn, the others pull with [1-9]' "$folder/drawn-88.txt" ||
+  ! grep -q '^a gall bladder on a bed of 12 ties: 12 torn' "$folder/drawn-130.txt"; then
+  echo "the bed of the gall bladder does not peel" >&2
   exit 1
 fi
