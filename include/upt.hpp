@@ -33,6 +33,7 @@ namespace upt {
 template <typename T> class span {
 public:
   constexpr span() noexcept = default;
+  /// Of nothing; of a pointer and a count; of an array; of a container.
   constexpr span(std::nullptr_t) noexcept {}
   constexpr span(T *data, std::size_t size) noexcept : data_(data), size_(size) {}
   template <std::size_t N> constexpr span(T (&array)[N]) noexcept : data_(array), size_(N) {}
@@ -41,11 +42,17 @@ public:
   constexpr span(Container &&container) noexcept
       : data_(container.data()), size_(container.size()) {}
 
+  /// Of the first element.
   constexpr T *data() const noexcept { return data_; }
+  /// Number of elements.
   constexpr std::size_t size() const noexcept { return size_; }
+  /// Whether there are none.
   constexpr bool empty() const noexcept { return size_ == 0; }
+  /// Of the first element, as a range has it.
   constexpr T *begin() const noexcept { return data_; }
+  /// Behind the last element.
   constexpr T *end() const noexcept { return data_ + size_; }
+  /// An element; the index is not checked.
   constexpr T &operator[](std::size_t index) const noexcept { return data_[index]; }
 
 private:
@@ -63,7 +70,9 @@ inline bool abi_matches() noexcept { return upt_abi_version() == UPT_ABI_VERSION
 /// A failed call; the library's state is what it was before.
 class error : public std::runtime_error {
 public:
+  /// What `check` throws.
   error(upt_status status, const char *message) : std::runtime_error(message), status_(status) {}
+  /// The status that the call returned; `what()` is the library's message.
   upt_status status() const noexcept { return status_; }
 
 private:
@@ -234,6 +243,7 @@ public:
     raw_.support_count = supports.size();
     return *this;
   }
+  /// For calls of the C ABI.
   const upt_input *get() const noexcept { return &raw_; }
   /// Whether the spans' sizes agree; a call that takes an input that does not fit refuses it.
   bool fits() const noexcept { return fits_; }
@@ -243,8 +253,11 @@ private:
   bool fits_ = true;
 };
 
+/// Starts the library with options of your own; the first model starts it with the defaults.
 inline upt_status init(const upt_init_options &options) { return check(upt_init(&options)); }
+/// Ends the library. Destroy scenes and models before.
 inline upt_status shutdown() { return check(upt_shutdown()); }
+/// The library's messages up to a level, on the host's threads, during its calls; NULL: none.
 inline upt_status set_log(upt_log_fn callback, void *user, upt_log_level level) {
   return check(upt_set_log(callback, user, level));
 }
@@ -283,16 +296,21 @@ public:
     }
   }
 
+  /// Whether it holds one.
   explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// For calls of the C ABI; stays this object's.
   upt_model *get() const noexcept { return handle_; }
 
+  /// What the model is: counts of nodes and triangles, the length of a step, memory.
   upt_status info(upt_model_info &out) const {
     out = make<upt_model_info>();
     return check(upt_model_read_info(handle_, &out));
   }
+  /// Where the nodes are at rest; out: [K,3], mm.
   upt_status positions(span<float> out) const {
     return check(upt_model_read_positions(handle_, out.data(), out.size()));
   }
+  /// A set of nodes or triangles: UPT_SET_*.
   upt_status indices(upt_index_set set, std::vector<std::uint32_t> &out) const {
     std::uint64_t needed = 0;
     const upt_status status = check(upt_model_read_indices(handle_, set, nullptr, 0, &needed));
@@ -302,6 +320,7 @@ public:
     out.resize(static_cast<std::size_t>(needed));
     return check(upt_model_read_indices(handle_, set, out.data(), out.size(), &needed));
   }
+  /// What the bundle and this machine make of the model, as JSON: names, hashes, instruction set.
   upt_status describe(std::string &out) const {
     std::uint64_t needed = 0;
     upt_status status = check(upt_model_describe(handle_, nullptr, 0, &needed));
@@ -314,6 +333,7 @@ public:
   }
 
 #ifndef UPT_NO_EXCEPTIONS
+  /// The bundle in the folder `path` (UTF-8).
   static Model open(const char *path, const upt_model_options *options = nullptr) {
     Model model;
     model.reopen(path, options);
@@ -382,6 +402,7 @@ public:
   }
 
 #ifndef UPT_NO_EXCEPTIONS
+  /// As `create`.
   explicit Hull(span<const float> points, span<const std::uint32_t> faces = {}) {
     create(points, faces);
   }
@@ -394,7 +415,9 @@ public:
     }
   }
 
+  /// Whether it holds one.
   explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// For calls of the C ABI; stays this object's.
   upt_hull *get() const noexcept { return handle_; }
 
   /// A sliding instrument of this shape, without friction, at the origin of the mesh's frame.
@@ -453,6 +476,7 @@ public:
   }
 
 #ifndef UPT_NO_EXCEPTIONS
+  /// As `create`.
   explicit Scene(const Model &model, const upt_scene_options *options = nullptr) {
     create(model, options);
   }
@@ -465,9 +489,12 @@ public:
     }
   }
 
+  /// Whether it holds one.
   explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// For calls of the C ABI; stays this object's.
   upt_scene *get() const noexcept { return handle_; }
 
+  /// Back to rest, with the intact body.
   upt_status reset() { return check(upt_scene_reset(handle_)); }
 
   /// One step, with contact of instruments solved; out: [n,3] or empty.
@@ -484,32 +511,37 @@ public:
     return check(upt_scene_step_field(handle_, displacement.data(), collision.data(), out.data(),
                                       out.size()));
   }
+  /// The last published state; out: [n,3], mm, in the region's order. Any thread may call it.
   upt_status read(span<float> out) {
     return check(upt_scene_read(handle_, out.data(), out.size()));
   }
 
-  /// The same on the scene's worker; the input is copied.
+  /// As `step`, on the scene's worker; the input is copied.
   upt_status submit(const Input &input = {}) {
     if (!input.fits()) {
       return detail::mismatch();
     }
     return check(upt_scene_submit(handle_, input.get()));
   }
+  /// UPT_OK when the submitted step has finished, UPT_PENDING while it runs; its error, once.
   upt_status poll() { return check(upt_scene_poll(handle_)); }
+  /// As `poll`, but waits for the step; UPT_PENDING when the time is up.
   upt_status wait(std::uint32_t timeout_ms) { return check(upt_scene_wait(handle_, timeout_ms)); }
+  /// Between the last two states, alpha from 0 to 1; out: [n,3], mm. Any thread may call it.
   upt_status sample(double alpha, span<float> out) {
     return check(upt_scene_sample(handle_, alpha, out.data(), out.size()));
   }
 
-  /// Empty: all nodes.
+  /// A step computes these nodes alone, in this order, which makes it cheaper; empty: all nodes.
   upt_status set_region(span<const std::uint32_t> nodes) {
     return check(
         upt_scene_set_region(handle_, nodes.empty() ? nullptr : nodes.data(), nodes.size()));
   }
+  /// Displacements of any nodes in the last state, decoded now; out: [nodes,3], mm.
   upt_status decode(span<const std::uint32_t> nodes, span<float> out) {
     return check(upt_scene_decode(handle_, nodes.data(), nodes.size(), out.data(), out.size()));
   }
-  /// points: [n,3]; empty detaches.
+  /// Points in the tissue at rest that steps carry along: [n,3], mm; empty detaches.
   upt_status attach_points(span<const float> points) {
     if (points.size() % 3 != 0) {
       return detail::mismatch();
@@ -517,9 +549,11 @@ public:
     return check(upt_scene_attach_points(handle_, points.empty() ? nullptr : points.data(),
                                          points.size() / 3));
   }
+  /// Displacements of the attached points in the last state; out: [n,3], mm.
   upt_status read_points(span<float> out) {
     return check(upt_scene_read_points(handle_, out.data(), out.size()));
   }
+  /// As `read_points`, between the last two states, alpha from 0 to 1.
   upt_status sample_points(double alpha, span<float> out) {
     return check(upt_scene_sample_points(handle_, alpha, out.data(), out.size()));
   }
@@ -574,7 +608,8 @@ public:
     return status;
   }
 
-  /// nodes: [capacity]; vectors: [capacity,3]; count: contacts found.
+  /// The nodes that instruments touch and where they push them, for bundles without a linear
+  /// response. nodes: [capacity]; vectors: [capacity,3], mm; count: contacts found.
   upt_status contacts_from_instruments(span<const upt_instrument> instruments,
                                        span<std::uint32_t> nodes, span<float> vectors,
                                        std::uint64_t &count) {
@@ -585,6 +620,7 @@ public:
                                                      instruments.size(), nodes.data(),
                                                      vectors.data(), nodes.size(), &count));
   }
+  /// Forces on the instrument at the last step's contact nodes, in their order; out: [m,3], mN.
   upt_status contact_force(span<float> out) {
     return check(upt_scene_read_contact_force(handle_, out.data(), out.size()));
   }
@@ -647,14 +683,17 @@ public:
     return check(upt_scene_read_surface_positions(handle_, out.data(), out.size()));
   }
 
+  /// What the last step was: flags, corrections, the estimated error.
   upt_status stats(upt_scene_stats &out) const {
     out = make<upt_scene_stats>();
     return check(upt_scene_read_stats(handle_, &out));
   }
+  /// What the last step and its stages took, ms.
   upt_status timing(upt_scene_timing &out) const {
     out = make<upt_scene_timing>();
     return check(upt_scene_read_timing(handle_, &out));
   }
+  /// A snapshot of state and body, from which `restore` goes on to the bit.
   upt_status save(std::vector<std::uint8_t> &out) {
     std::uint64_t needed = 0;
     const upt_status status = check(upt_scene_save(handle_, nullptr, 0, &needed));
@@ -664,6 +703,7 @@ public:
     out.resize(static_cast<std::size_t>(needed));
     return check(upt_scene_save(handle_, out.data(), out.size(), &needed));
   }
+  /// Goes on from a snapshot of the same model.
   upt_status restore(span<const std::uint8_t> bytes) {
     return check(upt_scene_restore(handle_, bytes.data(), bytes.size()));
   }
@@ -785,19 +825,23 @@ public:
   }
 
 #ifndef UPT_NO_EXCEPTIONS
+  /// As `create`.
   Haptics(const Scene &scene, const upt_haptics_options &options) { create(scene, options); }
   Haptics(const Scene &scene, std::uint32_t instrument, const upt_instrument &tool) {
     create(scene, instrument, tool);
   }
 #endif
 
+  /// The scene steps on without it.
   void destroy() noexcept {
     if (handle_ != nullptr) {
       upt_haptics_destroy(std::exchange(handle_, nullptr));
     }
   }
 
+  /// Whether it holds one.
   explicit operator bool() const noexcept { return handle_ != nullptr; }
+  /// For calls of the C ABI; stays this object's.
   upt_haptics *get() const noexcept { return handle_; }
 
   /// Never waits. If it fails, the force in out is zero.
@@ -879,9 +923,8 @@ public:
     return scene.reset();
   }
 
-  // The parts of `frame`, for hosts that call the scene themselves.
-
-  /// The instruments are here at `now`.
+  /// The instruments are here at `now`. This call and those below are the parts of `frame`, for
+  /// hosts that call the scene themselves.
   void moved(double now, span<const upt_instrument> instruments) {
     if (!started_) {
       started_ = true;

@@ -2,9 +2,9 @@
 // by one, and support groups.
 #include "soft_tissue.hpp"
 
-/* hang(place [m], radius [mm], stiffness [N/m], tears_at [mN]) -> int: the tissue this near to a
- * place is tied to the tool where that is now, and goes with it. Stiffness and strength are those
- * of all ties together. How many ties there are; a tool that is released takes them along. */
+/// A bed: the tissue within this radius (mm) of a place (m) is tied to the tool where that is now,
+/// and goes with it. Stiffness (N/m) and tearing force (mN, 0: never) are those of all ties
+/// together. Returns how many ties there are; a tool that is released takes them along.
 void hang(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result) {
   auto &out = *static_cast<int64_t *>(result);
   out = 0;
@@ -18,16 +18,15 @@ void hang(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionT
   });
 }
 
-/* torn() -> int: ties of the bed that have torn until the last step. */
+/// Ties of the bed that have torn until the last step.
 void torn(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto &out = *static_cast<int64_t *>(result);
   out = 0;
   opened(instance, [&](const Tissue &tissue) { out = static_cast<int64_t>(tissue.torn()); });
 }
 
-/* lead(group, position [m], rotation, let_go): a support group of the bundle goes on from where it
- * was meshed, as a rigid body, in every step from now on; or it holds nothing until it is led
- * again. */
+/// A support group of the bundle goes on from where it was meshed, as a rigid body (place in m), in
+/// every step from now on; with `let_go` it holds nothing until it is led again.
 void lead(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result) {
   const auto *position = static_cast<const float *>(arguments[1]),
              *rotation = static_cast<const float *>(arguments[2]);

@@ -3,8 +3,7 @@
 
 #include <stdexcept>
 
-/* work_as(kind): what the tool does from the next press on: 0 presses, 1 cuts, 2 aspirates,
- * 3 coagulates. */
+/// What the tool does from the next press on: 0 presses, 1 cuts, 2 aspirates, 3 coagulates.
 void work_as(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result) {
   put(result, opened(instance, [&](Tissue &tissue) {
         const int64_t kind = *static_cast<const int64_t *>(arguments[0]);
@@ -16,34 +15,35 @@ void work_as(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensi
       }));
 }
 
-/* undo() -> bool: the body before the last stroke of a tool that changes it. */
+/// The body before the last stroke of a tool that changes it; false where there is none.
 void undo(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   bool done = false;
   opened(instance, [&](Tissue &tissue) { done = tissue.undo(); });
   put(result, done);
 }
 
-/* changes() -> int: where it is another number, rest() and faces() are others. */
+/// Where it is another number than before, `rest()` and `faces()` are others.
 void changes(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto &out = *static_cast<int64_t *>(result);
   out = 0;
   opened(instance, [&](const Tissue &tissue) { out = tissue.changes(); });
 }
 
-/* outside() -> int: so many of faces() were on the intact body's surface, the others inside. */
+/// So many of `faces()`, the first ones, were on the intact body's surface; the others are inside.
 void outside(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto &out = *static_cast<int64_t *>(result);
   out = 0;
   opened(instance, [&](const Tissue &tissue) { out = static_cast<int64_t>(tissue.outside()); });
 }
 
-/* cut_area() -> float, mm2; removed() -> float, mm3: of all strokes. */
+/// New surface by all strokes, mm².
 void cut_area(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto &out = *static_cast<double *>(result);
   out = 0;
   opened(instance, [&](const Tissue &tissue) { out = static_cast<double>(tissue.area()); });
 }
 
+/// What the body has lost by all strokes, mm³.
 void removed(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto &out = *static_cast<double *>(result);
   out = 0;

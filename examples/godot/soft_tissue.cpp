@@ -4,19 +4,8 @@
  * (x, y, z) -> (x, z, -y) / 1000 is a quarter turn about x, so windings stay outward (Godot draws
  * clockwise faces as front, which `faces` takes into account).
  *
- * Script side: open(bundle), rest(), faces(), hold(friction, grasp, tear_off_mn), press(shape,
- * position, rotation, half_extents, radius), release(), work_as(kind), undo(),
- * breathe(amplitude, period), hang(place, radius, stiffness, tears_at), torn(), lead(group,
- * position, rotation, let_go), frame(now), wait(), changes(), outside(), cut_area(), removed(),
- * vertices(), step_ms(), contact_count(), force(), penetration(), flags(), corrections_made(),
- * error_mm(), message(). `press` and `release` say where the tool is now, `frame` makes the surface
- * of this moment; steps run on a worker meanwhile.
- *
- * Properties, in the inspector too; `open` reads them: corrections (1 to 64: the most that a step
- * in contact gets, 0: what the bundle recommends, -1: none), corrections_target_mm (fewer where the
- * estimated error is below this, 0: always so many), substeps (1 to 8: the most of a step that
- * would err by more than the target, 0: what the bundle recommends), step_s (length of a step, s,
- * 0.01 to 0.05, 0: what the bundle recommends for frames). */
+ * What stands as `///` above a function that METHODS or PROPERTIES names is its text in
+ * docs/reference/gdscript.md (`cargo xtask api`). */
 #include "soft_tissue.hpp"
 #include "godot_api.h"
 
@@ -29,6 +18,7 @@
 static const char CLASS_NAME[] = "SoftTissue3D";
 static const float METRES = 0.001f;
 
+/// Opens a bundle's folder, at rest, with the properties as they are now; closes what was open.
 static void open_bundle(void *instance, const GDExtensionConstTypePtr *arguments,
                         GDExtensionTypePtr result) {
   auto *self = static_cast<SoftTissue *>(instance);
@@ -58,14 +48,17 @@ static void put_vertices(void *instance, float scale, GDExtensionTypePtr array) 
   });
 }
 
+/// The vertices of the surface at rest, m.
 static void rest(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   put_vertices(instance, 0.0f, result);
 }
 
+/// The vertices of the surface at the moment of the last `frame`, m.
 static void vertices(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   put_vertices(instance, 1.0f, result);
 }
 
+/// The surface's triangles: three places in `vertices()` for each, clockwise as seen from outside.
 static void faces(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   opened(instance, [&](const Tissue &tissue) {
     const std::vector<std::uint32_t> &all = tissue.faces();
@@ -81,7 +74,8 @@ static void faces(void *instance, const GDExtensionConstTypePtr *, GDExtensionTy
   });
 }
 
-/* press(shape, position [m], rotation, half_extents [mm], radius [mm]): where the tool is now. */
+/// Where the tool is from now on: its shape (0 capsule, 1 box, 2 spatula, 4 sphere), place (m) and
+/// rotation; half its lengths and the radius of its rounding in mm.
 static void press(void *instance, const GDExtensionConstTypePtr *arguments,
                   GDExtensionTypePtr result) {
   const upt_instrument &hold = static_cast<SoftTissue *>(instance)->hold;
@@ -108,7 +102,8 @@ static void press(void *instance, const GDExtensionConstTypePtr *arguments,
       }));
 }
 
-/* breathe(amplitude [m], period [s]): what holds the organ goes up and down from now on. */
+/// What holds the organ goes up and down from now on: by the amplitude (m), once a period (s). An
+/// amplitude of 0 ends it.
 static void breathe(void *instance, const GDExtensionConstTypePtr *arguments,
                     GDExtensionTypePtr result) {
   put(result, opened(instance, [&](Tissue &tissue) {
@@ -116,8 +111,8 @@ static void breathe(void *instance, const GDExtensionConstTypePtr *arguments,
       }));
 }
 
-/* hold(friction, grasp, tear_off [mN]): how the tool of the next presses holds the tissue.
- * tear_off 0: a grasp never lets go. */
+/// How the tool of the next presses holds the tissue: Coulomb's coefficient; whether it grasps; the
+/// pull at which a grasp tears off, mN, 0: never.
 static void hold(void *instance, const GDExtensionConstTypePtr *arguments,
                  GDExtensionTypePtr result) {
   upt_instrument &hold = static_cast<SoftTissue *>(instance)->hold;
@@ -127,27 +122,31 @@ static void hold(void *instance, const GDExtensionConstTypePtr *arguments,
   put(result, true);
 }
 
+/// The tool leaves the tissue.
 static void release(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   put(result, opened(instance, [](Tissue &tissue) { tissue.in_hand = false; }));
 }
 
-/* frame(now [s]): the surface at this moment, by the host's own clock. */
+/// Makes the surface of this moment by a clock of your own, s, and the next step, which runs on a
+/// worker, where it is due. Call it once a frame.
 static void frame(void *instance, const GDExtensionConstTypePtr *arguments,
                   GDExtensionTypePtr result) {
   put(result, opened(instance, [&](Tissue &tissue) { tissue.frame(real(arguments[0])); }));
 }
 
-/* wait(): until the step in flight has landed. */
+/// Waits until the step in flight has landed: for tests, and pictures that are the same everywhere.
 static void wait(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   put(result, opened(instance, [](Tissue &tissue) { tissue.wait(); }));
 }
 
+/// What the last step took, ms.
 static void step_ms(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto &out = *static_cast<double *>(result);
   out = 0;
   opened(instance, [&](const Tissue &tissue) { out = tissue.timing().step_ms; });
 }
 
+/// Points of the tissue that push or hold the tool in the last step.
 static void contact_count(void *instance, const GDExtensionConstTypePtr *,
                           GDExtensionTypePtr result) {
   auto &out = *static_cast<int64_t *>(result);
@@ -155,7 +154,7 @@ static void contact_count(void *instance, const GDExtensionConstTypePtr *,
   opened(instance, [&](const Tissue &tissue) { out = tissue.reading().contact_count; });
 }
 
-/* force() -> Vector3: on the tool in the last step, mN, Godot's axes. */
+/// The force on the tool in the last step, mN.
 static void force(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto *out = static_cast<float *>(result);
   out[0] = out[1] = out[2] = 0;
@@ -167,7 +166,7 @@ static void force(void *instance, const GDExtensionConstTypePtr *, GDExtensionTy
   });
 }
 
-/* penetration() -> float: how deep tissue lies inside of the tool at the last step, mm. */
+/// How deep tissue lies inside of the tool at the end of the last step, mm.
 static void penetration(void *instance, const GDExtensionConstTypePtr *,
                         GDExtensionTypePtr result) {
   auto &out = *static_cast<double *>(result);
@@ -175,14 +174,14 @@ static void penetration(void *instance, const GDExtensionConstTypePtr *,
   opened(instance, [&](const Tissue &tissue) { out = tissue.reading().penetration_mm; });
 }
 
-/* flags() -> int: UPT_FLAG_* of the last step. */
+/// Flags of the last step: a sum of `UPT_FLAG_*` of [the C ABI](abi.md), 0 when all is well.
 static void flags(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto &out = *static_cast<int64_t *>(result);
   out = 0;
   opened(instance, [&](const Tissue &tissue) { out = tissue.stats().flags; });
 }
 
-/* corrections_made() -> int: in the last step. */
+/// Corrections that the last step made.
 static void corrections_made(void *instance, const GDExtensionConstTypePtr *,
                              GDExtensionTypePtr result) {
   auto &out = *static_cast<int64_t *>(result);
@@ -190,7 +189,7 @@ static void corrections_made(void *instance, const GDExtensionConstTypePtr *,
   opened(instance, [&](const Tissue &tissue) { out = tissue.stats().corrections; });
 }
 
-/* error_mm() -> float: the estimated error of the last step; 0 without corrections. */
+/// The estimated error of the last step, mm; 0 without corrections.
 static void error_mm(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   auto &out = *static_cast<double *>(result);
   out = 0;
@@ -199,6 +198,8 @@ static void error_mm(void *instance, const GDExtensionConstTypePtr *, GDExtensio
 
 static Effort &effort(void *instance) { return static_cast<SoftTissue *>(instance)->effort; }
 
+/// The most corrections that a step in contact gets, 1 to 64; 0: what the bundle recommends; -1:
+/// none. `open` reads it.
 static void set_corrections(void *instance, const GDExtensionConstTypePtr *arguments,
                             GDExtensionTypePtr) {
   effort(instance).corrections = *static_cast<const int64_t *>(arguments[0]);
@@ -209,6 +210,8 @@ static void get_corrections(void *instance, const GDExtensionConstTypePtr *,
   *static_cast<int64_t *>(result) = effort(instance).corrections;
 }
 
+/// Corrections end where the estimated error is below this, mm; 0: always all of them. `open` reads
+/// it.
 static void set_target(void *instance, const GDExtensionConstTypePtr *arguments,
                        GDExtensionTypePtr) {
   effort(instance).target_mm = real(arguments[0]);
@@ -218,6 +221,8 @@ static void get_target(void *instance, const GDExtensionConstTypePtr *, GDExtens
   *static_cast<double *>(result) = effort(instance).target_mm;
 }
 
+/// The most shorter steps in place of one that would err by more than the target, 1 to 8; 0: what
+/// the bundle recommends. `open` reads it.
 static void set_substeps(void *instance, const GDExtensionConstTypePtr *arguments,
                          GDExtensionTypePtr) {
   effort(instance).substeps = *static_cast<const int64_t *>(arguments[0]);
@@ -228,6 +233,7 @@ static void get_substeps(void *instance, const GDExtensionConstTypePtr *,
   *static_cast<int64_t *>(result) = effort(instance).substeps;
 }
 
+/// The length of a step, 0.01 to 0.05 s; 0: what the bundle recommends for frames. `open` reads it.
 static void set_step(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr) {
   effort(instance).step_s = real(arguments[0]);
 }
@@ -236,11 +242,14 @@ static void get_step(void *instance, const GDExtensionConstTypePtr *, GDExtensio
   *static_cast<double *>(result) = effort(instance).step_s;
 }
 
+/// What the last call that failed says.
 static void message(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   godot.ptr_destructor(GDEXTENSION_VARIANT_TYPE_STRING)(result);
   godot.string_new(result, static_cast<SoftTissue *>(instance)->message.c_str());
 }
 
+/// A tissue whose surface follows tools: `open` a bundle, say where the tool is with `press`, and
+/// call `frame` and `vertices` in each `_process`.
 static GDExtensionObjectPtr create_instance(void *) {
   GodotStringName parent, name;
   GDExtensionObjectPtr object;

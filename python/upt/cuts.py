@@ -48,6 +48,7 @@ class Blade:
     """Where the edge is sharp; zeros: everywhere."""
 
     def record(self) -> _native.Blade:
+        """As the C struct."""
         record = _native.Blade()
         record.fracture_energy = number(self.fracture_energy, "fracture_energy")
         record.threshold = number(self.threshold, "threshold")

@@ -4,6 +4,7 @@ export class UptError extends Error {
   readonly status: string;
 }
 
+/** How the library is loaded. */
 export interface LoadOptions {
   /** The module; by default `upt.wasm` beside the package's files. */
   wasm?: WebAssembly.Module | BufferSource | Response | Promise<Response>;
@@ -15,6 +16,7 @@ export function load(options?: LoadOptions): Promise<Upt>;
 /** Where a bundle is: the address of its folder, `File`s, or bytes by name. */
 export type BundleSource = string | URL | Iterable<File> | Record<string, ArrayBuffer | ArrayBufferView>;
 
+/** How a bundle is opened. */
 export interface OpenOptions {
   /** In place of the browser's `fetch`. */
   fetch?: (url: URL) => Promise<Response>;
@@ -24,31 +26,43 @@ export interface OpenOptions {
   portable?: boolean;
 }
 
+/** The library, loaded. */
 export interface Upt {
+/** Its version. */
   readonly version: string;
+/** A bundle made ready to step. */
   open(source: BundleSource, options?: OpenOptions): Promise<Model>;
 }
 
+/** The nodes or triangles of a mesh that `Model.indices` gives. */
 export type IndexSet = "surfaceNodes" | "domainNodes" | "fixedNodes" | "surfaceFaces" | "domainFaces" | "tets";
 
 /** The fields of `upt_model_info`. */
 export interface ModelInfo {
+/** K, the nodes of the mesh. */
   node_count: number;
+/** Tetrahedra. */
   tet_count: number;
+/** Triangles of the boundary. */
   surface_face_count: number;
+/** Nodes that instruments may touch. */
   domain_node_count: number;
+/** Nodes held where they are. */
   held_node_count: number;
-  /** s. */
+  /** Length of a step, s. */
   dt: number;
-  /** mm. */
+  /** Longest push that it was made for, mm. */
   max_push_mm: number;
+/** Memory of the model. */
   memory_bytes: number;
+/** Time to open it. */
   load_seconds: number;
   /** The length of a step that suits hosts that show frames, s. */
   frame_step_s: number;
   [field: string]: number;
 }
 
+/** What a scene is made with. */
 export interface SceneOptions {
   /** Length of a step, 0.01 to 0.05 s; by default the bundle's. */
   stepSeconds?: number;
@@ -60,26 +74,31 @@ export interface SceneOptions {
   budgetUs?: number;
   /** The flag UPT_FLAG_ERROR rises above this estimated error, mm. */
   errorLimitMm?: number;
-  /** 1/s. */
+  /** Damping of the tissue, 1/s; by default the bundle's. */
   dampingPerSecond?: number;
+/** The most substeps of a step that would miss the target, 1 for none, up to 8; by default the bundle's. */
   substeps?: number;
   /** What is done with a state that is no longer plausible. */
   guard?: "hold" | "report" | "blend";
+/** Tissue at rest is stepped too. */
   neverSleeps?: boolean;
 }
 
+/** A rigid instrument where it is at the end of the step. */
 export interface Instrument {
   /** Centre, mm, in the mesh's frame. */
   position: ArrayLike<number> & Iterable<number>;
   /** Unit quaternion x, y, z, w. */
   rotation?: ArrayLike<number> & Iterable<number>;
-  shape?: "capsule" | "box" | "spatula";
-  /** Of a capsule, or a spatula's corners, mm. */
+/** A capsule by default; along its local y. */
+  shape?: "sphere" | "capsule" | "box" | "spatula";
+  /** Of a ball or capsule, or a spatula's corners, mm. */
   radius?: number;
-  /** Of a capsule's axis, its local y, mm. */
+  /** Half length of a capsule's axis, its local y, mm. */
   halfLength?: number;
-  /** Of a box or spatula, mm. */
+  /** Half sizes of a box or spatula, mm. */
   halfExtents?: ArrayLike<number>;
+/** Slides by default; a grasp holds what was near when it began. */
   mode?: "slide" | "grasp";
   /** Coulomb's coefficient. */
   friction?: number;
@@ -89,13 +108,17 @@ export interface Instrument {
 
 /** The fields of `upt_instrument_reading`. */
 export interface Reading {
+/** Points of the tissue that push or hold it. */
   contact_count: number;
   /** On the instrument, mN. */
   force: [number, number, number];
-  /** mN mm. */
+  /** About its position, mN mm. */
   torque: [number, number, number];
+/** How deep tissue lies inside of it, mm. */
   penetration_mm: number;
+/** 1 where its grasp tore off in this step. */
   torn: number;
+/** What is left of the contact problem, mm. */
   residual_mm: number;
 }
 
@@ -103,20 +126,30 @@ export interface Reading {
 export interface Stats {
   /** UPT_FLAG_*. */
   flags: number;
+/** Steps since creation or reset. */
   step_count: number;
+/** Largest displacement, mm. */
   max_displacement_mm: number;
+/** Corrections that the last step made. */
   corrections: number;
+/** Its estimated error, mm; 0 without corrections. */
   error_mm: number;
+/** Above 1: outside of what the model was made for. */
   indicator: number;
+/** 1 where the tissue is at rest and steps cost nothing. */
   sleeping: number;
   [field: string]: number;
 }
 
 /** The fields of `upt_scene_timing`: what the last step and its stages took, ms. */
 export interface Timing {
+/** Steps since creation or reset, the last of which this is of. */
   step_count: number;
+/** The whole step. */
   step_ms: number;
+/** Corrections. */
   corrections_ms: number;
+/** Contact with instruments, a part of the corrections. */
   contact_ms: number;
   [field: string]: number;
 }
@@ -125,12 +158,15 @@ export interface Timing {
 export interface Model {
   /** For the C ABI. */
   readonly handle: number;
+/** Counts and the length of a step. */
   readonly info: ModelInfo;
   /** Name, hash and more. */
   describe(): { name: string; bundle_sha256: string; instruction_set: string; [field: string]: unknown };
   /** At rest [K,3], mm. */
   positions(): Float32Array;
+/** Nodes, three for each face, or four for each tetrahedron. */
   indices(set: IndexSet): Uint32Array;
+/** A tissue at rest. */
   scene(options?: SceneOptions): Scene;
   /** Its scenes stay usable. */
   close(): void;
@@ -140,26 +176,31 @@ export interface Model {
 export interface Cut {
   /** 1 where the body is another one: its surface wants an update. */
   is_changed: number;
+/** Nodes of the body now. */
   node_count: number;
+/** Nodes that the operation has added. */
   copied_count: number;
   /** New area, mm². */
   area_mm2: number;
   /** What the body has lost, mm³. */
   removed_mm3: number;
+/** Pieces that nothing holds. */
   fragment_count: number;
   /** On the blade, mN. */
   force: [number, number, number];
 }
 
+/** How a blade cuts. */
 export interface CutOptions {
   /** Calls with the same number are one blade that goes on. */
   stroke?: number;
-  /** Of the edge. */
+  /** Points of the edge. */
   points?: number;
   /** What new area takes, J/m². */
   fractureEnergy?: number;
-  /** With how much the blade must be pushed before it cuts, and is, mN. */
+  /** With how much the blade must be pushed before it cuts, mN. */
   threshold?: number;
+/** How much it is pushed, mN. */
   pushed?: number;
   /** Where the edge is sharp; zeros: everywhere. */
   ahead?: ArrayLike<number>;
@@ -167,6 +208,7 @@ export interface CutOptions {
 
 /** The closed surface of a body. Vertices and slots of triangles keep their numbers. */
 export interface Surface {
+/** All of it: the first surface, and after another body was put back. */
   isNew: boolean;
   /** The first vertex that is new. */
   firstVertex: number;
@@ -188,15 +230,19 @@ export interface Scene {
   step(instruments?: Instrument[], timeSeconds?: number): Float32Array;
   /** The tissue `when` seconds after the last step, with the instruments there: of the region, of the attached points, or of the surface's vertices. */
   present(when: number, instruments?: Instrument[], options?: { points?: boolean; surface?: boolean }): Float32Array;
+/** The last published state, as `step` gives it. */
   read(): Float32Array;
   /** Of the last step's instruments, in their order. */
   readings(): Reading[];
+/** What the last step was. */
   stats(): Stats;
+/** What it took. */
   timing(): Timing;
   /** The nodes that are shown from here on; none means all. */
   setRegion(nodes?: ArrayLike<number> & Iterable<number>): void;
   /** Points [p,3] at rest, mm. */
   attachPoints(points: ArrayLike<number> & Iterable<number>): void;
+/** Displacements [p,3] of the attached points in the last state, mm. */
   readPoints(): Float32Array;
   /** Of the body: copies that cuts have made included. */
   readonly nodeCount: number;
@@ -210,14 +256,18 @@ export interface Scene {
   scaleStiffness(elements: ArrayLike<number> & Iterable<number>, factor: number): Cut;
   /** Takes the pieces that nothing holds out of the body. */
   dropFragments(): Cut;
+/** The surface of the body as it is now, and what has changed since the last call. */
   updateSurface(): Surface;
   /** State and body. */
   save(): Uint8Array;
+/** Back to what `save` gave, to the bit. */
   restore(snapshot: Uint8Array): void;
   /** Begins to record what the scene is given, for `upt replay --verify`, with a hash after every so many steps (1); 0 ends it. */
   record(every?: number): void;
   /** The lines of the recording that were not taken before; together they make the file. */
   takeRecord(): string;
+/** Back to rest, with the intact body. */
   reset(): void;
+/** Frees it. */
   close(): void;
 }

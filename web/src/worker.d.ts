@@ -1,11 +1,14 @@
 import type { BundleSource, Instrument, ModelInfo, Reading, SceneOptions, Stats, Timing } from "./index.js";
 
+/** How a tissue is opened. */
 export interface TissueOptions {
   /** By default: the bundle's step for frames, a budget of 30 % of it, a guard that reports. */
   scene?: SceneOptions;
+/** The module; by default `upt.wasm` beside the package's files. */
   wasm?: string | URL | WebAssembly.Module;
   /** The module and the bundle lie on the host as `NAME.gz`, for hosts that compress nothing. */
   gzip?: boolean;
+/** Called as files come: bytes so far, and of all. */
   progress?: (done: number, total: number) => void;
   /** In place of the package's own, for bundlers that need to see `new Worker(...)`. */
   worker?: Worker;
@@ -13,6 +16,7 @@ export interface TissueOptions {
 
 /** What a tool does: it touches the tissue, or changes the body at each step. The blade's edge is 20 mm from the tool's tip up; the others reach the ball at it. */
 export interface Tool extends Instrument {
+/** By default it presses. */
   kind?: "press" | "blade" | "aspirator" | "coagulator";
 }
 
@@ -20,13 +24,17 @@ export interface Tool extends Instrument {
 export interface SurfaceNews {
   /** All of it. */
   isNew: boolean;
+/** Vertices of the whole surface. */
   vertices: number;
+/** Slots of triangles of the whole surface. */
   slots: number;
+/** The first vertex that is new. */
   firstVertex: number;
   /** At rest, of the vertices from `firstVertex` on [.,3], mm. */
   rest: Float32Array;
-  /** Slots with other corners, and these [.,3]: three zeros where there is no triangle. */
+  /** Slots with other corners. */
   changed: Uint32Array;
+  /** These corners [.,3]: three zeros where there is no triangle. */
   corners: Uint32Array;
   /** 1 for each changed slot whose triangle was inside of the intact body. */
   inside: Uint32Array;
@@ -36,7 +44,9 @@ export interface SurfaceNews {
 
 /** What strokes have done so far. */
 export interface SurgeryState {
+/** New surface, mm². */
   areaMm2: number;
+/** What the body has lost, mm³. */
   removedMm3: number;
   /** Nodes that cuts have added. */
   copies: number;
@@ -44,12 +54,13 @@ export interface SurgeryState {
   undos: number;
   /** On the blade, mN. */
   force: number[];
-  /** That the last change of the body took. */
+  /** What the last change of the body took, ms. */
   changeMs: number;
   /** Why the last operation was refused. */
   refused?: string;
 }
 
+/** The tissue of one picture. */
 export interface Frame {
   /** Of the surface's nodes [n,3], mm; from the first stroke of a tool that cuts on, of the vertices of `surface`. */
   displacement: Float32Array;
@@ -57,22 +68,29 @@ export interface Frame {
   points?: Float32Array;
   /** What has changed of the surface since the last frame. */
   surface?: SurfaceNews;
+/** Cuts, aspiration and coagulation so far. */
   surgery: SurgeryState;
   /** Where they are in this frame. */
   instruments: Tool[];
   /** Of the last step. */
   readings: Reading[];
+/** Of the last step. */
   stats: Stats;
+/** Of the last step. */
   timing: Timing;
-  /** That the frame took to make. */
+  /** What the frame took to make, ms. */
   frameMs: number;
+/** Whether instruments are kept, for `replay`. */
   recording: boolean;
+/** Whether recorded steps are made again. */
   replaying: boolean;
 }
 
 /** A tissue that a worker steps at the clock's pace. */
 export class Tissue {
+/** Opens a bundle in a worker of its own. */
   static open(source: BundleSource, options?: TissueOptions): Promise<Tissue>;
+/** Counts and the bundle's name. */
   readonly info: ModelInfo & { name: string };
   /** The surface's nodes [n]. */
   readonly nodes: Uint32Array;
@@ -82,6 +100,7 @@ export class Tissue {
   readonly faces: Uint32Array;
   /** 1 where the bundle was made to be touched [n]. */
   readonly domain: Uint32Array;
+/** Length of a step, s. */
   readonly stepSeconds: number;
   /** The tissue of this moment. Ask for one for each picture; without frames there are no steps. */
   frame(instruments?: Tool[]): Promise<Frame>;
@@ -89,10 +108,12 @@ export class Tissue {
   attach(points: Iterable<number>): Promise<void>;
   /** The body before the last stroke; false where there is none. */
   undo(): Promise<boolean>;
+/** Back to rest, with the intact body. */
   reset(): Promise<void>;
   /** Keeps the instruments of each step; false: no longer. */
   record(on: boolean): Promise<void>;
   /** From rest, makes the recorded steps again. */
   replay(): Promise<void>;
+/** Ends the worker. */
   close(): void;
 }

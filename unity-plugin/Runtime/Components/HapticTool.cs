@@ -10,14 +10,18 @@ namespace Upt
     /// <summary>Where a device's handle is, world axes and units.</summary>
     public struct HapticPose
     {
+        /// <summary>Place.</summary>
         public Vector3 position;
+        /// <summary>Turn.</summary>
         public Quaternion rotation;
     }
 
     /// <summary>What the hand is to feel, world axes: on the tool, N; about its position, N m.</summary>
     public struct HapticWrench
     {
+        /// <summary>On the tool, N.</summary>
         public Vector3 force;
+        /// <summary>About the tool's position, N m.</summary>
         public Vector3 torque;
         /// <summary>Whether the tool touches.</summary>
         public bool contact;

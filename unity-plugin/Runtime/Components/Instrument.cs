@@ -6,9 +6,13 @@ namespace Upt
     /// <summary>Shape of an instrument's tip.</summary>
     public enum InstrumentShape
     {
+        /// <summary>A cylinder with round ends, along the object's y axis.</summary>
         Capsule = 0,
+        /// <summary>With sharp edges.</summary>
         Box = 1,
+        /// <summary>A box whose edges are rounded.</summary>
         Spatula = 2,
+        /// <summary>The convex hull of a collider's mesh.</summary>
         Hull = 3,
     }
 

@@ -8,6 +8,7 @@ namespace Upt.Interop
         /// <summary>The status, one of <c>Native.UPT_ERR_*</c>.</summary>
         public upt_status Status { get; private set; }
 
+        /// <summary>As a failed call throws it.</summary>
         public UptException(upt_status status, string message) : base(message)
         {
             Status = status;
