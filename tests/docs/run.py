@@ -13,6 +13,8 @@ from pathlib import Path
 from urllib.parse import unquote
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "xtask/api"))
+import api
 import blocks
 import bundles
 import commands
@@ -100,6 +102,8 @@ def main() -> int:
     tally.add([fault for path in sources for fault in english.faults(path)])
     for name in ("README.md", "SUMMARY.md", "decisions/README.md"):
         tally.add(index(pages, name))
+    for make in api.PAGES:
+        tally.add(api.stale(make))
     tally.add(bundles.faults())
     tally.add(results.faults())
     tally.add(book())

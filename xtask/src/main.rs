@@ -145,6 +145,13 @@ enum Task {
         #[arg(long, conflicts_with = "check")]
         release: bool,
     },
+    /// Write the pages of docs/reference on C++, C#, Python, GDScript and JavaScript from their sources.
+    #[command(after_help = "Examples:\n  cargo xtask api\n  cargo xtask api --check")]
+    Api {
+        /// Only say whether they are up to date.
+        #[arg(long)]
+        check: bool,
+    },
     /// Train, evaluate or export bundles: runs the Python package with its environment set up.
     #[command(
         after_help = "Examples:\n  cargo xtask bundle -- export --help\n  cargo xtask bundle --module upt_training.reduced -- --help"
@@ -193,6 +200,7 @@ fn run(workspace: &Workspace, task: Task) -> Result<bool> {
         Task::Study { arguments } => upkeep::study(workspace, &arguments),
         Task::Footprint { page } => footprint::run(workspace, page.as_deref()),
         Task::Header { check, release } => upkeep::header(workspace, check, release),
+        Task::Api { check } => upkeep::api(workspace, check),
         Task::Bundle { module, arguments } => upkeep::bundle(workspace, &module, &arguments),
         Task::Ort { platform, version } => {
             let platform = platform.map_or_else(ort::Platform::host, Ok)?;

@@ -1,4 +1,4 @@
-//! `cargo xtask header`, `bundle`, `soup`, `view`, `study` and `readme`: one program or one page, with its set-up.
+//! `cargo xtask header`, `api`, `bundle`, `soup`, `view`, `study` and `readme`: one program or one page, with its set-up.
 
 use std::path::{Path, PathBuf};
 
@@ -16,6 +16,13 @@ pub fn header(workspace: &Workspace, check: bool, release: bool) -> Result<bool>
         _ => "",
     };
     run_visibly(&mut workspace.cargo(&format!("run --quiet --release -p upt-bindgen -- {word}")))
+}
+
+/// Writes the pages of docs/reference that are made of the languages' sources.
+pub fn api(workspace: &Workspace, check: bool) -> Result<bool> {
+    venv::create(workspace, "target/venv")?;
+    let mut command = workspace.python("xtask/api/api.py");
+    run_visibly(command.args(check.then_some("--check")))
 }
 
 /// Runs the Python package's command line with the environment set up: `cargo xtask bundle -- export ...`.
