@@ -946,6 +946,28 @@ typedef struct upt_support {
 } upt_support;
 
 /**
+ * A force at a point of the tissue, an element of `upt_input.point_forces`; `upt_model_locate_points` finds the point.
+ */
+typedef struct upt_point_force {
+  /**
+   * `sizeof(upt_point_force)`, the same in every element of an array.
+   */
+  uint32_t struct_size;
+  /**
+   * Nodes of the model's mesh around the point, which share the force (where the scene has been cut, the tissue at their places does), ...
+   */
+  uint32_t nodes[4];
+  /**
+   * ... and their weights, 0 or more, with the sum 1; all zero: the first node alone.
+   */
+  float weights[4];
+  /**
+   * mN, at most 1000000 in each direction, in the mesh's frame.
+   */
+  float force[3];
+} upt_point_force;
+
+/**
  * The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: the tissue moves on by itself.
  *
  * One thing drives a step: `instruments`, the nodes in contact, or `collision`; two at once are `UPT_ERR_ARGUMENT`. Later versions add
@@ -1025,6 +1047,14 @@ typedef struct upt_input {
    * At most 64.
    */
   uint64_t support_count;
+  /**
+   * `[point_force_count]`: forces at points of the tissue at the end of the step, beside `forces`, all with the same `struct_size`.
+   */
+  const struct upt_point_force *point_forces;
+  /**
+   * At most 256.
+   */
+  uint64_t point_force_count;
   /**
    * Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.
    */
@@ -1799,6 +1829,25 @@ upt_status upt_model_read_region(const struct upt_model *model,
                                  uint32_t *nodes,
                                  uint64_t node_capacity,
                                  uint64_t *needed);
+
+/**
+ * Finds points of the intact mesh: of each the tetrahedron that holds it, or of one outside of the mesh the closest combination. What `upt_point_force` takes; some milliseconds
+ * for a large mesh, so find a point once, not in every step.
+ *
+ * - `places`: `[count,3]`, rest positions, mm.
+ * - `count`: number of points.
+ * - `nodes`: `[count,4]`, receives the corners of each one's tetrahedron.
+ * - `weights`: `[count,4]`, receives their weights, 0 or more, with the sum 1.
+ *
+ * Threads: any.
+ * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (a point 25 mm or more outside of the mesh), `UPT_ERR_OUT_OF_MEMORY`,
+ * `UPT_ERR_PANIC`.
+ */
+upt_status upt_model_locate_points(const struct upt_model *model,
+                                   const float *places,
+                                   uint64_t count,
+                                   uint32_t *nodes,
+                                   float *weights);
 
 /**
  * Creates a scene at rest.

@@ -219,6 +219,12 @@ public:
     raw_.forces = forces.data();
     return *this;
   }
+  /// Forces at points of the tissue (`model.locate`), at most 256; struct_size is set in each.
+  Input &point_forces(span<const upt_point_force> forces) noexcept {
+    raw_.point_forces = forces.data();
+    raw_.point_force_count = forces.size();
+    return *this;
+  }
   /// Pressures on parts of the surface; struct_size is set in each.
   Input &pressures(span<const upt_pressure> pressures) noexcept {
     raw_.pressures = pressures.data();
@@ -310,6 +316,24 @@ public:
   upt_status positions(span<float> out) const {
     return check(upt_model_read_positions(handle_, out.data(), out.size()));
   }
+  /// Forces of zero at places of the mesh at rest, [n,3], mm: find them once, set them in each
+  /// step.
+  upt_status locate(span<const float> places, std::vector<upt_point_force> &out) const {
+    const std::size_t count = places.size() / 3;
+    if (places.size() % 3 != 0) {
+      return detail::mismatch();
+    }
+    std::vector<std::uint32_t> nodes(4 * count);
+    std::vector<float> weights(4 * count);
+    const upt_status status =
+        check(upt_model_locate_points(handle_, places.data(), count, nodes.data(), weights.data()));
+    out.assign(status == UPT_OK ? count : 0, make<upt_point_force>());
+    for (std::size_t point = 0; point < out.size(); point++) {
+      std::copy_n(&nodes[4 * point], 4, out[point].nodes);
+      std::copy_n(&weights[4 * point], 4, out[point].weights);
+    }
+    return status;
+  }
   /// A set of nodes or triangles: UPT_SET_*.
   upt_status indices(upt_index_set set, std::vector<std::uint32_t> &out) const {
     std::uint64_t needed = 0;
@@ -350,6 +374,11 @@ public:
   std::vector<float> positions() const {
     std::vector<float> out(static_cast<std::size_t>(3 * info().node_count));
     positions(out);
+    return out;
+  }
+  std::vector<upt_point_force> locate(span<const float> places) const {
+    std::vector<upt_point_force> out;
+    locate(places, out);
     return out;
   }
   std::vector<std::uint32_t> indices(upt_index_set set) const {

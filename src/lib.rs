@@ -93,7 +93,8 @@ pub use options::{
     UserStream,
 };
 pub use scene::{
-    Bed, Blade, Contact, Cut, CutSurface, GroupMotion, Loads, MAX_PRESSURES, MAX_SUPPORTS,
-    Pressure, Progress, Scene, StepInput, SupportPose, SurfaceUpdate, View,
+    Bed, Blade, Contact, Cut, CutSurface, GroupMotion, Loads, MAX_POINT_FORCES, MAX_PRESSURES,
+    MAX_SUPPORTS, PointForce, Pressure, Progress, Scene, StepInput, SupportPose, SurfaceUpdate,
+    View,
 };
 pub use stats::{SceneStats, SceneTiming, flag};

@@ -131,6 +131,11 @@ fn loads_allocate_nothing() {
             let loads = upt::Loads {
                 gravity: [wave, 0.0, -1.0],
                 forces: Some(&forces),
+                point_forces: &[upt::PointForce {
+                    nodes: [node as u32; 4],
+                    force: [0.0, wave, 0.0],
+                    ..upt::PointForce::default()
+                }],
                 pressures: &pressures,
                 support: Some(upt::SupportPose {
                     position: [0.0, 0.0, 2.0 * wave],

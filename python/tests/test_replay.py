@@ -3,6 +3,7 @@
 import hashlib
 import json
 
+import numpy as np
 import pytest
 import upt
 
@@ -17,7 +18,15 @@ def test_a_recorder_writes_what_the_scene_was_given(tmp_path):
         scene.step([ball])
         recorder.flush()
         assert len(place.read_text().splitlines()) == 2
-        field = scene.step([ball], loads=upt.Loads(gravity=(0, 0, -1), pressures=[(None, 100.0)]))
+        nodes, weights = model.locate([tip])
+        np.testing.assert_allclose(weights[0] @ model.positions[nodes[0]], tip, atol=1e-3)
+        pull = upt.PointForce(nodes[0], (0, 0, 5), weights[0])
+        loads = upt.Loads(gravity=(0, 0, -1), pressures=[(None, 100.0)], point_forces=[pull])
+        field = scene.step([ball], loads=loads)
+        with pytest.raises(ValueError, match=r"point_forces\[0\] has 2 nodes"):
+            scene.step(loads=upt.Loads(point_forces=[upt.PointForce([1, 2], (0, 0, 5))]))
+        with pytest.raises(upt.ArgumentError, match=r"point_forces\[0\]: node 1000000"):
+            scene.step(loads=upt.Loads(point_forces=[upt.PointForce([1000000], (0, 0, 5))]))
         with pytest.raises(upt.StateError, match="a recording is on"):
             scene.record()
         with pytest.raises(upt.BundleError):
@@ -30,7 +39,9 @@ def test_a_recorder_writes_what_the_scene_was_given(tmp_path):
     given = first["step"]["instruments"][0]
     assert given["shape"] == {"kind": "sphere", "radius": 6} and "sha256" not in first["step"]
     assert given["position"] == pytest.approx([float(x) for x in tip + (0, 0, 3)])
-    assert second["step"]["loads"]["pressures"] == [{"nodes": [], "pascal": 100}] and reset == {"reset": {}}
+    assert second["step"]["loads"]["pressures"] == [{"nodes": [], "pascal": 100}]
+    assert second["step"]["loads"]["point_forces"][0]["nodes"] == nodes[0].tolist()
+    assert reset == {"reset": {}}
     assert second["step"]["sha256"] == hashlib.sha256(field.tobytes()).hexdigest()
     with pytest.raises(upt.StateError, match="no recording is on"):
         scene.end_record()

@@ -62,7 +62,7 @@ from upt.errors import (
 )
 from upt.haptics import Haptics
 from upt.instrument import Hull, Instrument
-from upt.loads import Loads, Support
+from upt.loads import Loads, PointForce, Support
 from upt.log import set_log
 from upt.model import Model
 from upt.replay import Recorder
@@ -116,6 +116,7 @@ __all__ = [
     "ModelInfo",
     "ModelOptions",
     "PanicError",
+    "PointForce",
     "Precision",
     "Provider",
     "Recorder",

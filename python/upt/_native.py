@@ -871,6 +871,10 @@ class Input(Record):
     meshed, or where it was held again. Pass them in every step."""
     support_count: int
     """At most 64."""
+    point_forces: int | None
+    """`[point_force_count]`: forces at points of the tissue at the end of the step, beside `forces`, all with the same `struct_size`."""
+    point_force_count: int
+    """At most 256."""
     gravity: tuple[float, ...] = vector("_gravity")
     """Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction."""
     gravity_at_rest: tuple[float, ...] = vector("_gravity_at_rest")
@@ -902,31 +906,13 @@ class Input(Record):
         ("tie_count", ctypes.c_uint64),
         ("supports", ctypes.c_void_p),
         ("support_count", ctypes.c_uint64),
+        ("point_forces", ctypes.c_void_p),
+        ("point_force_count", ctypes.c_uint64),
         ("_gravity", ctypes.c_float * 3),
         ("_gravity_at_rest", ctypes.c_float * 3),
         ("_support_position", ctypes.c_float * 3),
         ("_support_rotation", ctypes.c_float * 4),
         ("_reserved_end", ctypes.c_uint8 * 4),
-    ]
-
-
-class Pressure(Record):
-    """A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum."""
-
-    struct_size: int
-    """`sizeof(upt_pressure)`, the same in every element of an array."""
-    pascal: float
-    """From outside on the body, Pa, at most 1000000; negative for suction."""
-    nodes: int | None
-    """`[node_count]`: it acts on the boundary triangles with all three corners among these nodes; where the scene has been cut, on what is left of them."""
-    node_count: int
-    """At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare."""
-
-    _fields_ = [
-        ("struct_size", ctypes.c_uint32),
-        ("pascal", ctypes.c_float),
-        ("nodes", ctypes.c_void_p),
-        ("node_count", ctypes.c_uint64),
     ]
 
 
@@ -1243,6 +1229,46 @@ class Surface(Record):
     ]
 
 
+class PointForce(Record):
+    """A force at a point of the tissue, an element of `upt_input.point_forces`; `upt_model_locate_points` finds the point."""
+
+    struct_size: int
+    """`sizeof(upt_point_force)`, the same in every element of an array."""
+    nodes: tuple[int, ...] = vector("_nodes")
+    """Nodes of the model's mesh around the point, which share the force (where the scene has been cut, the tissue at their places does), ..."""
+    weights: tuple[float, ...] = vector("_weights")
+    """... and their weights, 0 or more, with the sum 1; all zero: the first node alone."""
+    force: tuple[float, ...] = vector("_force")
+    """mN, at most 1000000 in each direction, in the mesh's frame."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("_nodes", ctypes.c_uint32 * 4),
+        ("_weights", ctypes.c_float * 4),
+        ("_force", ctypes.c_float * 3),
+    ]
+
+
+class Pressure(Record):
+    """A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum."""
+
+    struct_size: int
+    """`sizeof(upt_pressure)`, the same in every element of an array."""
+    pascal: float
+    """From outside on the body, Pa, at most 1000000; negative for suction."""
+    nodes: int | None
+    """`[node_count]`: it acts on the boundary triangles with all three corners among these nodes; where the scene has been cut, on what is left of them."""
+    node_count: int
+    """At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare."""
+
+    _fields_ = [
+        ("struct_size", ctypes.c_uint32),
+        ("pascal", ctypes.c_float),
+        ("nodes", ctypes.c_void_p),
+        ("node_count", ctypes.c_uint64),
+    ]
+
+
 class Support(Record):
     """What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_read_support` names the groups."""
 
@@ -1293,6 +1319,7 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_model_read_indices": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_int32, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_model_read_support": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_model_read_region": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
+    "upt_model_locate_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_destroy": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_reset": (ctypes.c_int32, [ctypes.c_void_p]),

@@ -14,8 +14,9 @@ from upt import _native
 from upt._arrays import address, number, vectors
 from upt.ties import Tie
 
-#: The end of `upt_input`: forces, pressures, ties and supports, how many of each, gravity and that at rest, the pose.
-_LAYOUT = Struct("@PPQPQPQ13f")
+#: The end of `upt_input`: forces, pressures, ties, supports and forces at points, how many of each, gravity and that at
+#: rest, the pose.
+_LAYOUT = Struct("@PPQPQPQPQ13f")
 OFFSET: int = _native.Input.forces.offset  # type: ignore[union-attr]
 
 
@@ -50,6 +51,31 @@ class Support:
 
 
 @dataclass(frozen=True, slots=True)
+class PointForce:
+    """A force at a point of the tissue, an element of `Loads.point_forces`."""
+
+    nodes: Sequence[int]
+    """Four nodes around the point, `Model.locate` finds them, or one."""
+    force: tuple[float, float, float]
+    """mN, in the mesh's frame."""
+    weights: Sequence[float] = ()
+    """Those of the four nodes, 0 or more, with the sum 1; empty: the first node alone."""
+
+    def record(self, name: str) -> _native.PointForce:
+        """The struct."""
+        nodes, weights = [int(node) for node in self.nodes], [float(weight) for weight in self.weights]
+        if len(nodes) not in (1, 4) or len(weights) not in (0, 4):
+            raise ValueError(
+                f"{name} has {len(nodes)} nodes and {len(weights)} weights, must have four of each, or one node"
+            )
+        return _native.PointForce(
+            nodes=tuple(nodes * 4 if len(nodes) == 1 else nodes),
+            weights=tuple(weights or [0.0] * 4),
+            force=tuple(number(value, f"{name}.force") for value in self.force),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Loads:
     """Loads at the end of a step; within the step they change on a line from those of the last.
 
@@ -63,6 +89,8 @@ class Loads:
     """That under which the mesh was scanned, m/s²; zeros: the bundle's."""
     forces: ArrayLike | None = None
     """`[K, 3]`, mN, on the nodes."""
+    point_forces: Sequence[PointForce] = ()
+    """Forces at points of the tissue, at most 256, beside those on nodes."""
     pressures: Sequence[tuple[ArrayLike | None, float]] = ()
     """Pairs of nodes and a pressure from outside, Pa, which follows the surface.
 
@@ -100,8 +128,11 @@ class Loads:
         groups = [support.record(f"supports[{index}]") for index, support in enumerate(self.supports)]
         led = (_native.Support * len(groups))(*(record for record, _ in groups))
         led_at = addressof(led) if groups else 0
+        points = [force.record(f"point_forces[{index}]") for index, force in enumerate(self.point_forces)]
+        pushing = (_native.PointForce * len(points))(*points)
+        pushing_at = addressof(pushing) if points else 0
         at, tied_at = addressof(array) if records else 0, addressof(tied) if ties else 0
         pushed = 0 if forces is None else address(forces)
-        counted = (pushed, at, len(records), tied_at, len(ties), led_at, len(groups))
+        counted = (pushed, at, len(records), tied_at, len(ties), led_at, len(groups), pushing_at, len(points))
         _LAYOUT.pack_into(memory, OFFSET, *counted, *gravity)
-        return forces, regions, array, tied, groups, led
+        return forces, regions, array, tied, groups, led, pushing

@@ -12,8 +12,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from upt._arrays import Floats, Indices, address
+from upt._arrays import Floats, Indices, address, vectors
 from upt._library import check, ensure_started, lib, read_text
 from upt._native import IndexSet, ModelInfo, ModelOptions
 from upt.scene import Scene
@@ -107,6 +108,22 @@ class Model:
     def regions(self) -> dict[str, Indices]:
         """The named regions of the surface: by name their nodes, `[n]` uint32; `Loads.pressures` takes them."""
         return self._named("regions", lib.upt_model_read_region)
+
+    def locate(self, places: ArrayLike) -> tuple[Indices, Floats]:
+        """Points of the mesh at places at rest `[n, 3]`, mm, for `PointForce.nodes` and `PointForce.weights`.
+
+        Of each the tetrahedron that holds it; of one outside of the mesh the closest combination.
+
+        Returns:
+            Nodes `[n, 4]` and weights `[n, 4]`.
+        """
+        given = vectors(places, "places")
+        nodes, weights = np.zeros((len(given), 4), np.uint32), np.zeros((len(given), 4), np.float32)
+        if len(given):
+            check(
+                lib.upt_model_locate_points(self._handle, address(given), len(given), address(nodes), address(weights))
+            )
+        return nodes, weights
 
     def _named(self, what: str, read: Callable[..., int]) -> dict[str, Indices]:
         found: dict[str, Indices] = {}

@@ -5,6 +5,7 @@
 use super::constants::*;
 use super::convert;
 use super::failure::{Failure, fail};
+use super::load_structs::{upt_point_force, upt_pressure};
 use super::pointers::{each, options, slice};
 use super::step_structs::*;
 use super::support_structs::upt_support;
@@ -12,8 +13,8 @@ use super::ties::taken;
 use crate::contact::{MAX_TIES, MAX_TOOLS, Tool};
 use crate::features;
 use crate::scene::{
-    Contact, GroupMotion, Lists, Loads, MAX_PRESSURES, MAX_SUPPORTS, Pressure, Scene, StepInput,
-    SupportPose, View,
+    Contact, GroupMotion, Lists, Loads, MAX_POINT_FORCES, MAX_PRESSURES, MAX_SUPPORTS, PointForce,
+    Pressure, Scene, StepInput, SupportPose, View,
 };
 use ::contact::Tie;
 
@@ -39,7 +40,11 @@ impl Default for Arrays {
 pub(super) unsafe fn read_input<'a>(
     scene: &Scene,
     raw: *const upt_input,
-    Lists { tools, ties }: &'a mut Lists,
+    Lists {
+        tools,
+        ties,
+        point_forces,
+    }: &'a mut Lists,
     arrays: &'a mut Arrays,
 ) -> Result<StepInput<'a>, Failure> {
     // SAFETY: the caller's.
@@ -86,7 +91,7 @@ pub(super) unsafe fn read_input<'a>(
         displacement: unsafe { field(scene, raw.displacement, "input.displacement") }?,
         contact,
         // SAFETY: the caller's.
-        loads: unsafe { read_loads(scene, &raw, arrays, ties) }?,
+        loads: unsafe { read_loads(scene, &raw, arrays, (ties, point_forces)) }?,
         time_s: raw.time_s,
     })
 }
@@ -102,7 +107,7 @@ unsafe fn read_loads<'a>(
         pressures,
         supports,
     }: &'a mut Arrays,
-    ties: &'a mut Vec<Tie>,
+    (ties, point_forces): (&'a mut Vec<Tie>, &'a mut Vec<PointForce>),
 ) -> Result<Loads<'a>, Failure> {
     if raw.tie_count != 0 {
         features::instruments()?;
@@ -145,6 +150,28 @@ unsafe fn read_loads<'a>(
     };
     // SAFETY: the caller's.
     unsafe { each(raw.pressures, raw.pressure_count, "input.pressures", read) }?;
+    if raw.point_force_count > MAX_POINT_FORCES as u64 {
+        return fail(
+            UPT_ERR_ARGUMENT,
+            format!(
+                "input.point_force_count is {}, must be at most {MAX_POINT_FORCES}",
+                raw.point_force_count
+            ),
+        );
+    }
+    point_forces.clear();
+    let count = raw.point_force_count;
+    crate::memory::fit(point_forces, count as usize, "the forces at points")?;
+    let read = |_, own: upt_point_force| {
+        point_forces.push(PointForce {
+            nodes: own.nodes,
+            weights: own.weights,
+            force: own.force,
+        });
+        Ok(())
+    };
+    // SAFETY: the caller's.
+    unsafe { each(raw.point_forces, count, "input.point_forces", read) }?;
     // SAFETY: the caller's.
     let supports = unsafe { read_supports(raw, supports) }?;
     Ok(Loads {
@@ -153,6 +180,7 @@ unsafe fn read_loads<'a>(
         gravity_at_rest: raw.gravity_at_rest,
         // SAFETY: the caller's.
         forces: unsafe { field(scene, raw.forces, "input.forces") }?,
+        point_forces,
         pressures: &pressures[..raw.pressure_count as usize],
         ties,
         support: (raw.support_rotation != [0.0; 4] || raw.support_position != [0.0; 3]).then_some(

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use super::constants::*;
 use super::failure::{Failure, fail};
+use super::load_structs::{upt_point_force, upt_pressure};
 use super::step_structs::*;
 use super::structs::*;
 use super::support_structs::upt_support;
@@ -40,6 +41,7 @@ sized!(
     upt_scene_stats,
     upt_scene_timing,
     upt_input,
+    upt_point_force,
     upt_pressure,
     upt_tie,
     upt_support,

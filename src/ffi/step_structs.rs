@@ -4,6 +4,7 @@ use core::ptr::null;
 use safer_ffi::derive_ReprC;
 
 use super::constants::{upt_end, upt_mode, upt_shape, upt_view_kind};
+use super::load_structs::{upt_point_force, upt_pressure};
 use super::support_structs::upt_support;
 
 /// The input of a step, submitted or not, and of a frame between steps. All zero but `struct_size`: the tissue moves on by itself.
@@ -53,6 +54,10 @@ pub struct upt_input {
     pub supports: *const upt_support,
     /// At most 64.
     pub support_count: u64,
+    /// `[point_force_count]`: forces at points of the tissue at the end of the step, beside `forces`, all with the same `struct_size`.
+    pub point_forces: *const upt_point_force,
+    /// At most 256.
+    pub point_force_count: u64,
     /// Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.
     pub gravity: [f32; 3],
     /// Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node. Zeros: the bundle's, where `gravity` is not zero.
@@ -88,6 +93,8 @@ impl upt_input {
         tie_count: 0,
         supports: null(),
         support_count: 0,
+        point_forces: null(),
+        point_force_count: 0,
         gravity: [0.0; 3],
         gravity_at_rest: [0.0; 3],
         support_position: [0.0; 3],
@@ -114,21 +121,6 @@ impl upt_input {
             ..Self::NOTHING
         }
     }
-}
-
-/// A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum.
-#[derive_ReprC]
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct upt_pressure {
-    /// `sizeof(upt_pressure)`, the same in every element of an array.
-    pub struct_size: u32,
-    /// From outside on the body, Pa, at most 1000000; negative for suction.
-    pub pascal: f32,
-    /// `[node_count]`: it acts on the boundary triangles with all three corners among these nodes; where the scene has been cut, on what is left of them.
-    pub nodes: *const u32,
-    /// At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare.
-    pub node_count: u64,
 }
 
 /// A tie: a spring between a point of the tissue and something else, an element of `upt_input.ties`.

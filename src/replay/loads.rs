@@ -21,6 +21,8 @@ pub struct Loading<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub forces: Option<Rows<'a>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub point_forces: Vec<PointForce>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pressures: Vec<Pressure<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub support: Option<Pose>,
@@ -36,6 +38,7 @@ impl Loading<'_> {
         is_null(&self.gravity)
             && is_null(&self.gravity_at_rest)
             && self.forces.is_none()
+            && self.point_forces.is_empty()
             && self.pressures.is_empty()
             && self.support.is_none()
             && self.supports.is_empty()
@@ -51,6 +54,16 @@ fn is_null(vector: &[f32; 3]) -> bool {
 /// To the bit.
 pub(super) fn is_zero(value: &f64) -> bool {
     value.to_bits() == 0
+}
+
+/// `upt_point_force`.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointForce {
+    pub nodes: [u32; 4],
+    pub weights: [f32; 4],
+    /// mN.
+    pub force: [f32; 3],
 }
 
 /// `upt_pressure`.

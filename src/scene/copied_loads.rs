@@ -2,7 +2,9 @@
 
 use ::contact::Tie;
 
-use super::loads::{Loads, MAX_PRESSURES, Pressure, WHAT};
+use super::load_limits::WHAT;
+use super::loads::{Loads, MAX_PRESSURES, Pressure};
+use super::point_force::PointForce;
 use super::support::SupportPose;
 use super::supports::{GroupMotion, MAX_SUPPORTS};
 use crate::error::Result;
@@ -11,11 +13,12 @@ use crate::memory;
 /// See the module.
 #[derive(Default)]
 pub(super) struct CopiedLoads {
-    gravity: [f32; 3],
-    gravity_at_rest: [f32; 3],
+    /// Now, and at rest.
+    gravity: [[f32; 3]; 2],
     support: Option<SupportPose>,
     has_forces: bool,
     forces: Vec<f32>,
+    point_forces: Vec<PointForce>,
     /// One list of nodes after the other.
     nodes: Vec<u32>,
     /// How many of them each pressure has, and its size, Pa.
@@ -42,6 +45,7 @@ impl CopiedLoads {
         memory::fit(&mut self.nodes, nodes.sum(), WHAT)?;
         memory::fit(&mut self.pressures, loads.pressures.len(), WHAT)?;
         memory::replace(&mut self.ties, loads.ties, WHAT)?;
+        memory::replace(&mut self.point_forces, loads.point_forces, WHAT)?;
         let given = |motion: &GroupMotion<'_>| motion.displacements.map(<[f32]>::len);
         let numbers = loads.supports.iter().filter_map(given);
         memory::fit(&mut self.displacements, numbers.sum(), WHAT)?;
@@ -59,8 +63,7 @@ impl CopiedLoads {
                 count: given(motion),
             });
         }
-        self.gravity = loads.gravity;
-        self.gravity_at_rest = loads.gravity_at_rest;
+        self.gravity = [loads.gravity, loads.gravity_at_rest];
         self.support = loads.support;
         self.has_forces = loads.forces.is_some();
         self.forces.clear();
@@ -95,9 +98,10 @@ impl CopiedLoads {
             }
         }
         call(Loads {
-            gravity: self.gravity,
-            gravity_at_rest: self.gravity_at_rest,
+            gravity: self.gravity[0],
+            gravity_at_rest: self.gravity[1],
             forces: self.has_forces.then_some(&*self.forces),
+            point_forces: &self.point_forces,
             pressures: &pressures[..self.pressures.len()],
             support: self.support,
             ties: &self.ties,

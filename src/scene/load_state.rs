@@ -2,7 +2,9 @@
 
 use topology::{Body, Push};
 
-use super::loads::{Acting, Loads, WHAT};
+use super::load_limits::WHAT;
+use super::loads::{Acting, Loads};
+use super::node_forces::NodeForces;
 use super::pressed::Pressed;
 use super::support::{Carriage, Carried};
 use super::supports::{self, Moved};
@@ -25,10 +27,7 @@ pub struct LoadState {
     /// Nodes of a region, and boundary triangles of the domain.
     marked: Vec<bool>,
     is_domain: Vec<bool>,
-    /// Of each copy of a node: the node of the intact mesh that it stems from.
-    parents: Vec<u32>,
-    /// By node: its part of the force on the node of the intact mesh that it is or stems from; empty for an intact body.
-    takes: Vec<f32>,
+    forces: NodeForces,
     /// Mean of the nodes at rest.
     middle: [f32; 3],
     /// What holds the body in the step being made; none where that is what the bundle holds, at rest.
@@ -48,29 +47,15 @@ impl LoadState {
         let pressed = Pressed::new(mesh, body)?;
         let most = pressed.triangles.len();
         let numbers = || memory::room(most, WHAT);
-        let parents = memory::copied(body.map_or(&[], Body::parents), WHAT)?;
-        let count = mesh.node_count() - parents.len();
+        let forces = NodeForces::new(mesh, body)?;
+        let count = forces.count();
         let nodes = &mesh.positions.as_chunks::<3>().0[..count];
         let middle = [0, 1, 2].map(|axis| {
             let sum: f64 = nodes.iter().map(|node| f64::from(node[axis])).sum();
             (sum / nodes.len().max(1) as f64) as f32
         });
-        // In a cut body a node of an element that has changed may hold no tissue any more: what acts on it goes to the copies that carry its tissue.
-        let mut takes = Vec::new();
-        if let Some(body) = body {
-            takes = memory::filled(mesh.node_count(), 1.0, WHAT)?;
-            takes[count..].fill(0.0);
-            let mut parts = Vec::new();
-            let changed = body.changed_elements();
-            for node in changed.flat_map(|element| body.mesh().tet(element)) {
-                body.carriers(node, &mut parts)?;
-                takes[node as usize] = 0.0;
-                for (node, part) in &parts {
-                    takes[*node as usize] = *part as f32;
-                }
-            }
-        }
         Ok(LoadState {
+            forces,
             middle,
             held: None,
             moved: Moved::default(),
@@ -81,8 +66,6 @@ impl LoadState {
             pressed,
             marked: memory::filled(count, false, WHAT)?,
             is_domain: memory::collected(faces, is_domain, WHAT)?,
-            parents,
-            takes,
         })
     }
 
@@ -138,11 +121,8 @@ impl LoadState {
         mass: &[f32],
         (u, v, step_s): (&[f32], &[f32], f64),
     ) -> Result<()> {
-        let (parents, takes, first) = (&self.parents, &self.takes, self.marked.len());
-        let parent = |node: usize| match node.checked_sub(first) {
-            Some(copy) => parents[copy] as usize,
-            None => node,
-        };
+        self.forces.take(loads.point_forces)?;
+        let forces = &self.forces;
         supports::follow(
             mesh,
             loads.supports,
@@ -182,11 +162,10 @@ impl LoadState {
                 carriage.at(x, [0, 1, 2].map(|axis| at(v, axis)))
             });
             // A host gives forces by the intact mesh's nodes, mN; here they are µN, as the residual is.
-            let (from, part) = (parent(node), takes.get(node).copied().unwrap_or(1.0));
+            let own = forces.on(node, loads.forces);
             for axis in 0..3 {
-                let own = (loads.forces).map_or(0.0, |forces| part * forces[3 * from + axis]);
                 let push = pushed.get(3 * node + axis).copied().unwrap_or(0.0);
-                dead[axis] = mass * (acceleration[axis] + borne[axis]) + 1e3 * own + push;
+                dead[axis] = mass * (acceleration[axis] + borne[axis]) + 1e3 * own[axis] + push;
             }
         }
         // Pressures add up where regions overlap; the last entry is that of the whole domain, for faces that cuts lay open.
@@ -197,7 +176,7 @@ impl LoadState {
             let (nodes, marked) = (pressure.nodes, &mut self.marked);
             nodes
                 .iter()
-                .for_each(|node| marked[parent(*node as usize)] = true);
+                .for_each(|node| marked[forces.parent(*node as usize)] = true);
             let mut is_on_none = true;
             for (row, (face, pascal)) in faces.iter().zip(&mut next.pascal).enumerate() {
                 let is_in = match nodes.is_empty() {

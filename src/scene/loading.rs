@@ -3,8 +3,9 @@
 use topology::Push;
 
 use super::body::{SceneBody, at_rest};
+use super::load_limits::WHAT;
 use super::load_state::LoadState;
-use super::loads::{Acting, Loads, WHAT};
+use super::loads::{Acting, Loads};
 use super::supports::{self, GroupState};
 use std::sync::Arc;
 

@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use ::contact::Tie;
 
+use super::load_limits::{LARGEST_FORCE, LARGEST_PRESSURE, WHAT, check_size};
+use super::point_force::{self, PointForce};
 use super::support::{Carriage, Carried, SupportPose};
 use super::supports::{self, GroupMotion, GroupState};
 use crate::bundle::Mesh;
@@ -16,12 +18,6 @@ use crate::stored;
 
 /// Pressures of a step at most.
 pub const MAX_PRESSURES: usize = 32;
-/// The largest force on a node, in each direction, mN.
-pub const LARGEST_FORCE: f32 = 1e6;
-/// The largest pressure, Pa: ten times that of the air.
-pub const LARGEST_PRESSURE: f32 = 1e6;
-
-pub(super) const WHAT: &str = "the loads of a scene";
 
 /// Loads at the end of a step; within the step they change on a line from those of the last. By default there are none. They act in scenes
 /// that correct (`corrections`).
@@ -34,6 +30,8 @@ pub struct Loads<'a> {
     pub gravity_at_rest: [f32; 3],
     /// Forces on the nodes of the intact mesh `[K,3]`, mN. In a body that has been cut the tissue at a node's place takes its force.
     pub forces: Option<&'a [f32]>,
+    /// Forces at points of the tissue, at most [`MAX_POINT_FORCES`](crate::MAX_POINT_FORCES), beside those on nodes.
+    pub point_forces: &'a [PointForce],
     /// At most [`MAX_PRESSURES`]; a face in several of them takes their sum.
     pub pressures: &'a [Pressure<'a>],
     /// Where what holds the body is at the end of the step, where it moves. All else stays in the mesh's frame, which goes with the support: displacements,
@@ -62,6 +60,7 @@ impl Loads<'_> {
         gravity: [0.0; 3],
         gravity_at_rest: [0.0; 3],
         forces: None,
+        point_forces: &[],
         pressures: &[],
         support: None,
         ties: &[],
@@ -89,6 +88,7 @@ impl Loads<'_> {
     pub(super) fn acts_with(&self, acceleration: [f32; 3]) -> bool {
         acceleration != [0.0; 3]
             || self.forces.is_some()
+            || !self.point_forces.is_empty()
             || self.pressures.iter().any(|pressure| pressure.pascal != 0.0)
     }
 
@@ -130,6 +130,7 @@ impl Loads<'_> {
                 })?;
             }
         }
+        point_force::check(self.point_forces, count)?;
         if self.pressures.len() > MAX_PRESSURES {
             return Err(Error::Argument(format!(
                 "pressures has {} entries, must have at most {MAX_PRESSURES}",
@@ -148,19 +149,6 @@ impl Loads<'_> {
         }
         Ok(())
     }
-}
-
-fn check_size(value: f32, most: f32, unit: &str, name: impl Fn() -> String) -> Result<()> {
-    if !value.is_finite() {
-        return Err(Error::NonFinite(format!("{} is {value}", name())));
-    }
-    if value.abs() > most {
-        return Err(Error::Argument(format!(
-            "{} is {value} {unit}, must be at most {most}",
-            name()
-        )));
-    }
-    Ok(())
 }
 
 /// The loads of a state.

@@ -143,6 +143,11 @@ impl AttachedPoints {
         })
     }
 
+    /// Of each point the corners of its tetrahedron and their weights.
+    pub(super) fn corners(&self) -> impl Iterator<Item = ([u32; 4], [f32; 4])> {
+        self.nodes.iter().copied().zip(self.weights.iter().copied())
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.nodes.len()

@@ -3,7 +3,7 @@
 use ::topology::rest::FACES;
 use topology::Body;
 
-use super::loads::WHAT;
+use super::load_limits::WHAT;
 use crate::bundle::Mesh;
 use crate::corrections::LoadPoint;
 use crate::error::Result;

@@ -16,7 +16,7 @@ use crate::memory;
 use crate::replay::Recorder;
 use crate::replay::drive::Rows;
 use crate::replay::lines::Step;
-use crate::replay::loads::{Loading, Pose, Pressure, Support, Tie};
+use crate::replay::loads::{Loading, PointForce, Pose, Pressure, Support, Tie};
 
 pub(super) const WHAT: &str = "a recording";
 
@@ -129,6 +129,11 @@ fn loading<'a>(loads: &Loads<'a>) -> Result<Loading<'a>> {
         position: pose.position,
         rotation: pose.rotation,
     };
+    let point_forces = loads.point_forces.iter().map(|own| PointForce {
+        nodes: own.nodes,
+        weights: own.weights,
+        force: own.force,
+    });
     let pressures = loads.pressures.iter().map(|own| Pressure {
         nodes: Cow::Borrowed(own.nodes),
         pascal: own.pascal,
@@ -143,6 +148,7 @@ fn loading<'a>(loads: &Loads<'a>) -> Result<Loading<'a>> {
         gravity: loads.gravity,
         gravity_at_rest: loads.gravity_at_rest,
         forces: loads.forces.map(Rows::of).transpose()?,
+        point_forces: memory::collected(loads.point_forces.len(), point_forces, WHAT)?,
         pressures: memory::collected(loads.pressures.len(), pressures, WHAT)?,
         support: loads.support.map(pose),
         supports: memory::collected(loads.supports.len(), supports, WHAT)?,

@@ -5,6 +5,7 @@ use ::contact::Tie;
 
 use super::elastic::Haptics;
 use super::followed_surface::Followed;
+use super::point_force::PointForce;
 use super::presenter::Presenters;
 use crate::contact::Tool;
 use crate::instrument::{Instrument, InstrumentContacts};
@@ -22,6 +23,7 @@ pub(super) struct Asked {
 pub struct Lists {
     pub(crate) tools: Vec<Tool>,
     pub(crate) ties: Vec<Tie>,
+    pub(crate) point_forces: Vec<PointForce>,
 }
 
 /// What the first use makes.
@@ -30,7 +32,7 @@ pub struct Tools {
     pub(super) contacts: Mutex<Option<Asked>>,
     pub(super) presenters: Mutex<Presenters>,
     pub(super) surface: Mutex<Option<Followed>>,
-    /// The instruments and ties of a step are read into these lists, so that a call allocates nothing.
+    /// The instruments, ties and forces at points of a step are read into these lists, so that a call allocates nothing.
     pub(super) lists: Mutex<Lists>,
     /// Those of a frame between steps: another thread may present while one steps.
     pub(super) frame_lists: Mutex<Lists>,

@@ -15,6 +15,7 @@ struct Lists {
     vectors: Vec<f32>,
     field: Vec<f32>,
     pressures: Vec<upt_pressure>,
+    point_forces: Vec<upt_point_force>,
     ties: Vec<upt_tie>,
 }
 
@@ -34,6 +35,7 @@ impl World<'_> {
                 && input.contact_count <= lists.nodes.len() as u64
                 && input.pressure_count <= lists.pressures.len() as u64
                 && input.tie_count <= lists.ties.len() as u64
+                && input.point_force_count <= lists.point_forces.len() as u64
                 && (input.pressure_count == 0
                     || lists.pressures[0].node_count <= lists.nodes.len() as u64)
                 && drives < 2
@@ -133,7 +135,17 @@ impl World<'_> {
             nodes: listed.as_ptr(),
             node_count: absurd(listed.len(), nodes, call),
         };
+        let mut pulls = [2.0, -1.0, 0.5];
+        spoil(&mut pulls, call.odd, call.seed as usize % 7);
+        let wrong = call.odd == Odd::Wrong && call.seed.is_multiple_of(2);
+        let point_force = |at: u32| upt_point_force {
+            struct_size: sized::<upt_point_force>(call),
+            nodes: [at, 1, 2, if wrong { u32::MAX } else { 3 }],
+            weights: [[0.0; 4], [0.25; 4]][at as usize % 2],
+            force: pulls,
+        };
         Lists {
+            point_forces: (0..3).map(point_force).collect(),
             pressures: pascal.map(pressure).into(),
             ties: ties(call, nodes),
             tools: self.instruments(call, 4),
@@ -195,6 +207,10 @@ fn load(input: &mut upt_input, call: &Call, lists: &Lists) {
     spoil(&mut input.gravity, call.odd, at);
     input.pressures = lists.pressures.as_ptr();
     input.pressure_count = absurd(lists.pressures.len(), 32, call);
+    if call.seed.is_multiple_of(4) {
+        input.point_forces = lists.point_forces.as_ptr();
+        input.point_force_count = absurd(lists.point_forces.len(), 256, call);
+    }
     if call.seed.is_multiple_of(2) {
         input.forces = lists.field.as_ptr();
     }

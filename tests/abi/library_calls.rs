@@ -130,6 +130,28 @@ impl World<'_> {
                     );
                     (named, status)
                 }
+                Function::ModelLocate => {
+                    let mut places = [0.5f32; 6];
+                    spoil(&mut places, call.odd, call.seed as usize);
+                    let (mut nodes, mut weights) = ([0u32; 8], [0.0f32; 8]);
+                    let count = match call.size {
+                        Size::Zero => 0,
+                        Size::Absurd => u64::MAX - 3,
+                        _ => 2,
+                    };
+                    let status = upt_model_locate_points(
+                        model,
+                        pointer(&places, call, 0),
+                        count,
+                        pointer_mut(&mut nodes, call, 1),
+                        pointer_mut(&mut weights, call, 2),
+                    );
+                    let found = status == UPT_OK && count == 2;
+                    let sum: f32 = weights.iter().sum();
+                    assert!(!found || (sum - 2.0).abs() < 1e-5, "weights {weights:?}");
+                    assert!(found || sum == 0.0, "a failed call wrote {weights:?}");
+                    ("upt_model_locate_points", status)
+                }
                 Function::SceneCreate => (
                     "upt_scene_create",
                     self.scene_create(call, model, model_nodes),

@@ -192,8 +192,8 @@ impl<'a> World<'a> {
         use Function::*;
         match call.function {
             Init | Shutdown | Providers | ModelOpen | ModelClose | ModelInfo | ModelDescribe
-            | ModelPositions | ModelIndices | ModelSupport | ModelRegion | SceneCreate
-            | SceneDestroy | SetLog | Texts => self.call_library(call, scene),
+            | ModelPositions | ModelIndices | ModelSupport | ModelRegion | ModelLocate
+            | SceneCreate | SceneDestroy | SetLog | Texts => self.call_library(call, scene),
             Step | Submit | Present => self.call_driven(call, scene, nodes),
             Instruments | Readings | InstrumentContacts | HullCreate | HullDestroy => {
                 self.call_instruments(call, scene, nodes)

@@ -12,6 +12,7 @@ mod groups;
 mod loads;
 mod mistakes;
 mod mobilise;
+mod points;
 mod reach;
 mod regions;
 mod relaxing;

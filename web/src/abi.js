@@ -268,7 +268,7 @@ export const upt_scene_timing = {
   },
 };
 export const upt_input = {
-  size: 160,
+  size: 176,
   fields: {
     struct_size: ["Uint32", 0, 1],
     reserved: ["Uint8", 4, 4],
@@ -287,20 +287,13 @@ export const upt_input = {
     tie_count: ["BigUint64", 80, 1],
     supports: ["Uint32", 88, 1],
     support_count: ["BigUint64", 96, 1],
-    gravity: ["Float32", 104, 3],
-    gravity_at_rest: ["Float32", 116, 3],
-    support_position: ["Float32", 128, 3],
-    support_rotation: ["Float32", 140, 4],
-    reserved_end: ["Uint8", 156, 4],
-  },
-};
-export const upt_pressure = {
-  size: 24,
-  fields: {
-    struct_size: ["Uint32", 0, 1],
-    pascal: ["Float32", 4, 1],
-    nodes: ["Uint32", 8, 1],
-    node_count: ["BigUint64", 16, 1],
+    point_forces: ["Uint32", 104, 1],
+    point_force_count: ["BigUint64", 112, 1],
+    gravity: ["Float32", 120, 3],
+    gravity_at_rest: ["Float32", 132, 3],
+    support_position: ["Float32", 144, 3],
+    support_rotation: ["Float32", 156, 4],
+    reserved_end: ["Uint8", 172, 4],
   },
 };
 export const upt_tie = {
@@ -428,6 +421,24 @@ export const upt_surface = {
     triangle_count: ["BigUint64", 16, 1],
     first_vertex: ["BigUint64", 24, 1],
     changed_count: ["BigUint64", 32, 1],
+  },
+};
+export const upt_point_force = {
+  size: 48,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    nodes: ["Uint32", 4, 4],
+    weights: ["Float32", 20, 4],
+    force: ["Float32", 36, 3],
+  },
+};
+export const upt_pressure = {
+  size: 24,
+  fields: {
+    struct_size: ["Uint32", 0, 1],
+    pascal: ["Float32", 4, 1],
+    nodes: ["Uint32", 8, 1],
+    node_count: ["BigUint64", 16, 1],
   },
 };
 export const upt_support = {

@@ -12,9 +12,10 @@ const BEGIN: &str = "<!-- cargo xtask header: begin -->\n";
 const END: &str = "<!-- cargo xtask header: end -->";
 
 /// Headings of the calls, by the file of `src/ffi/` that holds them.
-const CHAPTERS: [(&str, &str); 15] = [
+const CHAPTERS: [(&str, &str); 16] = [
     ("library.rs", "Library"),
     ("model.rs", "Models"),
+    ("locate.rs", "Points of the tissue"),
     ("scene.rs", "Scenes and steps"),
     ("worker.rs", "Steps in the background"),
     ("region.rs", "Parts of the mesh"),

@@ -9,14 +9,16 @@ use syn::{Attribute, Expr, FnArg, Item, Lit, Pat, ReturnType, Type};
 pub const FOLDER: &str = "src/ffi";
 
 /// The files with exported items, in the order of the header.
-pub const FILES: [&str; 20] = [
+pub const FILES: [&str; 22] = [
     "../../crates/field/src/status.rs",
     "constants.rs",
     "structs.rs",
     "step_structs.rs",
+    "load_structs.rs",
     "support_structs.rs",
     "library.rs",
     "model.rs",
+    "locate.rs",
     "scene.rs",
     "worker.rs",
     "region.rs",

@@ -57,7 +57,6 @@ structs!(
     upt_scene_stats,
     upt_scene_timing,
     upt_input,
-    upt_pressure,
     upt_tie,
     upt_tie_reading,
     upt_bed,
@@ -68,6 +67,8 @@ structs!(
     upt_cut,
     upt_blade,
     upt_surface,
+    upt_point_force,
+    upt_pressure,
     upt_support
 );
 

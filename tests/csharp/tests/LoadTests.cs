@@ -56,6 +56,38 @@ namespace Upt.Tests
         }
 
         [Test]
+        public void AForceAtAPointIsThatOfItsNodes()
+        {
+            int nodes;
+            Domain(out nodes);
+            upt_point_force[] points;
+            StepInput shared = new StepInput { Forces = new float[3 * nodes] };
+            using (Model model = new Model(Environment.GetEnvironmentVariable("UPT_TEST_CORRECTED"), 1))
+            {
+                float[] positions = model.Positions();
+                float[] middle = new float[3];
+                uint[] tets = model.Indices(Native.UPT_SET_TETS);
+                for (int i = 0; i < 12; i++) middle[i % 3] += 0.25f * positions[3 * tets[i / 3] + i % 3];
+                points = model.Locate(middle);
+                Assert.Throws<ArgumentException>(() => model.Locate(new float[2]));
+            }
+            Assert.That(points.Length, Is.EqualTo(1));
+            unsafe
+            {
+                fixed (upt_point_force* point = points)
+                {
+                    point->force[2] = 20f;
+                    for (int k = 0; k < 4; k++)
+                    {
+                        Assert.That(point->weights[k], Is.EqualTo(0.25f).Within(1e-3f));
+                        shared.Forces[3 * point->nodes[k] + 2] = 20f * point->weights[k];
+                    }
+                }
+            }
+            Assert.That(After(new StepInput { PointForces = points }, 4, true), Is.EqualTo(After(shared, 4, false)));
+        }
+
+        [Test]
         public void PressureOnAListOfNodesIsThatOnTheDomain()
         {
             int nodes;

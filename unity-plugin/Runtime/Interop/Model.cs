@@ -97,6 +97,41 @@ namespace Upt.Interop
             }
         }
 
+        /// <summary>Forces of zero at places of the mesh at rest, <c>[n,3]</c>, mm: each in the tetrahedron that holds it. Find
+        /// them once, and set them in each step (<see cref="StepInput.PointForces"/>).</summary>
+        public upt_point_force[] Locate(float[] places)
+        {
+            if (places == null || places.Length % 3 != 0)
+                throw new ArgumentException("places must hold three numbers a place", "places");
+            int count = places.Length / 3;
+            upt_point_force[] forces = new upt_point_force[count];
+            uint[] nodes = new uint[4 * count];
+            float[] weights = new float[4 * count];
+            bool added = false;
+            handle.DangerousAddRef(ref added);
+            try
+            {
+                fixed (float* p = places)
+                fixed (uint* n = nodes)
+                fixed (float* w = weights)
+                    Status.Check(Native.upt_model_locate_points(handle.DangerousGetHandle(), p, (ulong)count, n, w));
+            }
+            finally
+            {
+                handle.DangerousRelease();
+            }
+            for (int i = 0; i < count; i++)
+            {
+                forces[i].struct_size = (uint)sizeof(upt_point_force);
+                for (int k = 0; k < 4; k++)
+                {
+                    forces[i].nodes[k] = nodes[4 * i + k];
+                    forces[i].weights[k] = weights[4 * i + k];
+                }
+            }
+            return forces;
+        }
+
         /// <summary>Node indices of a support group, ascending: what <see cref="StepInput.SupportGroups"/> moves. Groups count
         /// from 0; their names are in <see cref="Describe"/>, under <c>supports</c>.</summary>
         public uint[] SupportNodes(int group)

@@ -649,6 +649,10 @@ namespace Upt.Interop
         public upt_support* supports;
         /// <summary>At most 64.</summary>
         public ulong support_count;
+        /// <summary>`[point_force_count]`: forces at points of the tissue at the end of the step, beside `forces`, all with the same `struct_size`.</summary>
+        public upt_point_force* point_forces;
+        /// <summary>At most 256.</summary>
+        public ulong point_force_count;
         /// <summary>Gravity in the mesh's frame at the end of the step, m/s², at most 1000 in each direction.</summary>
         public fixed float gravity[3];
         /// <summary>Gravity under which the mesh was scanned, m/s²: what acts is `gravity - gravity_at_rest`, on the mass of each node. Zeros: the bundle's, where `gravity` is not zero.</summary>
@@ -663,20 +667,6 @@ namespace Upt.Interop
         public fixed float support_rotation[4];
         /// <summary>Zero.</summary>
         public fixed byte reserved_end[4];
-    }
-
-    /// <summary>A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum.</summary>
-    [StructLayout(LayoutKind.Sequential)]
-    public unsafe struct upt_pressure
-    {
-        /// <summary>`sizeof(upt_pressure)`, the same in every element of an array.</summary>
-        public uint struct_size;
-        /// <summary>From outside on the body, Pa, at most 1000000; negative for suction.</summary>
-        public float pascal;
-        /// <summary>`[node_count]`: it acts on the boundary triangles with all three corners among these nodes; where the scene has been cut, on what is left of them.</summary>
-        public uint* nodes;
-        /// <summary>At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare.</summary>
-        public ulong node_count;
     }
 
     /// <summary>A tie: a spring between a point of the tissue and something else, an element of `upt_input.ties`.</summary>
@@ -897,6 +887,34 @@ namespace Upt.Interop
         public ulong first_vertex;
         /// <summary>Slots whose corners have changed.</summary>
         public ulong changed_count;
+    }
+
+    /// <summary>A force at a point of the tissue, an element of `upt_input.point_forces`; `upt_model_locate_points` finds the point.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_point_force
+    {
+        /// <summary>`sizeof(upt_point_force)`, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>Nodes of the model's mesh around the point, which share the force (where the scene has been cut, the tissue at their places does), ...</summary>
+        public fixed uint nodes[4];
+        /// <summary>... and their weights, 0 or more, with the sum 1; all zero: the first node alone.</summary>
+        public fixed float weights[4];
+        /// <summary>mN, at most 1000000 in each direction, in the mesh's frame.</summary>
+        public fixed float force[3];
+    }
+
+    /// <summary>A pressure on a part of the surface, which follows the surface as it moves. A face in several of them takes their sum.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public unsafe struct upt_pressure
+    {
+        /// <summary>`sizeof(upt_pressure)`, the same in every element of an array.</summary>
+        public uint struct_size;
+        /// <summary>From outside on the body, Pa, at most 1000000; negative for suction.</summary>
+        public float pascal;
+        /// <summary>`[node_count]`: it acts on the boundary triangles with all three corners among these nodes; where the scene has been cut, on what is left of them.</summary>
+        public uint* nodes;
+        /// <summary>At most K; 0: it acts on the domain, and on all that cuts and removal have laid bare.</summary>
+        public ulong node_count;
     }
 
     /// <summary>What a support group of the bundle does at the end of a step, an element of `upt_input.supports`. `upt_model_read_support` names the groups.</summary>
@@ -1297,6 +1315,22 @@ namespace Upt.Interop
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern upt_status upt_model_read_region(IntPtr model, uint region, byte* name, ulong name_capacity, uint* nodes, ulong node_capacity, ulong* needed);
+
+        /// <summary>
+        /// Finds points of the intact mesh: of each the tetrahedron that holds it, or of one outside of the mesh the closest combination. What `upt_point_force` takes; some milliseconds
+        /// for a large mesh, so find a point once, not in every step.
+        ///
+        /// - `places`: `[count,3]`, rest positions, mm.
+        /// - `count`: number of points.
+        /// - `nodes`: `[count,4]`, receives the corners of each one's tetrahedron.
+        /// - `weights`: `[count,4]`, receives their weights, 0 or more, with the sum 1.
+        ///
+        /// Threads: any.
+        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_NON_FINITE`, `UPT_ERR_ARGUMENT` (a point 25 mm or more outside of the mesh), `UPT_ERR_OUT_OF_MEMORY`,
+        /// `UPT_ERR_PANIC`.
+        /// </summary>
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern upt_status upt_model_locate_points(IntPtr model, float* places, ulong count, uint* nodes, float* weights);
 
         /// <summary>
         /// Creates a scene at rest.

@@ -64,8 +64,9 @@ namespace Upt.Interop
                 fixed (float* u = input.Displacement)
                 fixed (float* f = input.Forces)
                 fixed (upt_tie* t = input.Ties)
+                fixed (upt_point_force* q = input.PointForces)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t, g);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t, g, q);
                     Status.Check(Native.upt_scene_present(scene, &raw, when, &shown, output, checked((ulong)floats)));
                 }
             }

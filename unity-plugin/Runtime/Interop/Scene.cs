@@ -82,9 +82,10 @@ namespace Upt.Interop
                 fixed (float* u = input.Displacement)
                 fixed (float* f = input.Forces)
                 fixed (upt_tie* t = input.Ties)
+                fixed (upt_point_force* q = input.PointForces)
                 fixed (float* o = output)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t, g);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t, g, q);
                     Status.Check(Native.upt_scene_step(scene, &raw, o, Length(output)));
                 }
             }
@@ -118,8 +119,9 @@ namespace Upt.Interop
                 fixed (float* u = input.Displacement)
                 fixed (float* f = input.Forces)
                 fixed (upt_tie* t = input.Ties)
+                fixed (upt_point_force* q = input.PointForces)
                 {
-                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t, g);
+                    upt_input raw = input.Raw(i, n, v, c, u, f, p, t, g, q);
                     Status.Check(Native.upt_scene_submit(scene, &raw));
                 }
             }

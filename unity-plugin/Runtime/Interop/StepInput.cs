@@ -37,6 +37,10 @@ namespace Upt.Interop
         /// corrections.</summary>
         public float[] Forces;
 
+        /// <summary>Forces at points of the tissue (<see cref="Model.Locate"/>), at most 256, beside
+        /// <see cref="Forces"/>.</summary>
+        public upt_point_force[] PointForces;
+
         /// <summary>Pressure on parts of the surface, at most 32.</summary>
         public Pressure[] Pressures;
 
@@ -101,7 +105,7 @@ namespace Upt.Interop
         /// <summary>As the library's struct, with the arrays where they are pinned.</summary>
         internal upt_input Raw(upt_instrument* instruments, uint* nodes, float* vectors, float* collision,
                                float* displacement, float* forces, upt_pressure* pressures, upt_tie* ties,
-                               upt_support* supports)
+                               upt_support* supports, upt_point_force* pointForces)
         {
             upt_input raw = default(upt_input);
             raw.struct_size = (uint)sizeof(upt_input);
@@ -120,6 +124,8 @@ namespace Upt.Interop
             raw.tie_count = (ulong)(Ties == null ? 0 : Ties.Length);
             raw.supports = supports;
             raw.support_count = (ulong)(SupportGroups == null ? 0 : SupportGroups.Length);
+            raw.point_forces = pointForces;
+            raw.point_force_count = (ulong)(PointForces == null ? 0 : PointForces.Length);
             raw.gravity[0] = Gravity.X;
             raw.gravity[1] = Gravity.Y;
             raw.gravity[2] = Gravity.Z;

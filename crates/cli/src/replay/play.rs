@@ -5,7 +5,10 @@ use contact::Body;
 use upt::replay::drive::Rows;
 use upt::replay::lines::{Cut, Line, Step};
 use upt::replay::loads::Pose;
-use upt::{Blade, Contact, GroupMotion, Loads, Pressure, Scene, StepInput, SupportPose, Tie, Tool};
+use upt::{
+    Blade, Contact, GroupMotion, Loads, PointForce, Pressure, Scene, StepInput, SupportPose, Tie,
+    Tool,
+};
 
 use yardstick::manifest::hex;
 
@@ -115,6 +118,12 @@ impl Player {
             displacements: own.displacements.as_deref(),
         });
         let (pressures, supports): (Vec<_>, Vec<_>) = (pressures.collect(), supports.collect());
+        let at_points = given.point_forces.iter().map(|own| PointForce {
+            nodes: own.nodes,
+            weights: own.weights,
+            force: own.force,
+        });
+        let point_forces: Vec<_> = at_points.collect();
         let ties: Vec<Tie> = given.ties.iter().map(Tie::from).collect();
         let input = StepInput {
             displacement: displacement.as_deref(),
@@ -123,6 +132,7 @@ impl Player {
                 gravity: given.gravity,
                 gravity_at_rest: given.gravity_at_rest,
                 forces: forces.as_deref(),
+                point_forces: &point_forces,
                 pressures: &pressures,
                 support: given.support.map(pose),
                 ties: &ties,

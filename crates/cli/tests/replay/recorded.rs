@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use upt::{
     Blade, Contact, Corrections, Error, GroupMotion, IndexSet, Loads, Mode, Model, ModelOptions,
-    Pressure, Progress, Scene, SceneOptions, Shape, Spring, StepInput, SupportPose, Tie, TieEnd,
-    TiePoint, Tool, Vector,
+    PointForce, Pressure, Progress, Scene, SceneOptions, Shape, Spring, StepInput, SupportPose,
+    Tie, TieEnd, TiePoint, Tool, Vector,
 };
 
 use super::of;
@@ -145,6 +145,11 @@ fn driven(scene: &Scene) {
             gravity: [0.1, 0.0, -0.6],
             gravity_at_rest: [0.0, 0.0, -0.2],
             forces: Some(&forces),
+            point_forces: &[PointForce {
+                nodes: [domain[0], domain[1], domain[2], domain[3]],
+                weights: [0.25; 4],
+                force: [0.0, 0.0, 0.5 * t as f32],
+            }],
             pressures: &pressures,
             support: Some(SupportPose {
                 position: [0.2 * t as f32, 0.0, 0.0],

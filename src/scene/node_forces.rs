@@ -1,0 +1,93 @@
+//! What each node of a body bears of a host's forces, which are given by nodes and points of the intact mesh.
+
+use topology::Body;
+
+use super::load_limits::WHAT;
+use super::point_force::PointForce;
+use crate::bundle::Mesh;
+use crate::error::Result;
+use crate::memory::{self, HeldBytes};
+
+/// See the module.
+#[derive(HeldBytes)]
+pub struct NodeForces {
+    /// Nodes of the intact mesh.
+    count: usize,
+    /// Of each copy of a node: the node of the intact mesh that it stems from.
+    parents: Vec<u32>,
+    /// By node: its part of the force on the node of the intact mesh that it is or stems from; empty for an intact body.
+    takes: Vec<f32>,
+    /// Of forces at points the sum at each node of the intact mesh `[count,3]`, mN; empty without any.
+    at_points: Vec<f32>,
+}
+
+impl NodeForces {
+    /// For a mesh as a body that was made of it is now.
+    pub(super) fn new(mesh: &Mesh, body: Option<&Body>) -> Result<NodeForces> {
+        let parents = memory::copied(body.map_or(&[], Body::parents), WHAT)?;
+        let count = mesh.node_count() - parents.len();
+        // In a cut body a node of an element that has changed may hold no tissue any more: what acts on it goes to the copies that carry its tissue.
+        let mut takes = Vec::new();
+        if let Some(body) = body {
+            takes = memory::filled(mesh.node_count(), 1.0, WHAT)?;
+            takes[count..].fill(0.0);
+            let mut parts = Vec::new();
+            let changed = body.changed_elements();
+            for node in changed.flat_map(|element| body.mesh().tet(element)) {
+                body.carriers(node, &mut parts)?;
+                takes[node as usize] = 0.0;
+                for (node, part) in &parts {
+                    takes[*node as usize] = *part as f32;
+                }
+            }
+        }
+        Ok(NodeForces {
+            count,
+            parents,
+            takes,
+            at_points: Vec::new(),
+        })
+    }
+
+    /// Nodes of the intact mesh.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The node of the intact mesh that a node is or stems from.
+    pub(super) fn parent(&self, node: usize) -> usize {
+        match node.checked_sub(self.count) {
+            Some(copy) => self.parents[copy] as usize,
+            None => node,
+        }
+    }
+
+    /// Takes the forces at points of a step.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub(super) fn take(&mut self, forces: &[PointForce]) -> Result<()> {
+        self.at_points.clear();
+        if forces.is_empty() {
+            return Ok(());
+        }
+        memory::fit(&mut self.at_points, 3 * self.count, WHAT)?;
+        self.at_points.resize(3 * self.count, 0.0);
+        for force in forces {
+            for (node, weight) in force.shares() {
+                let own = &mut self.at_points[3 * node as usize..][..3];
+                (own.iter_mut().zip(force.force)).for_each(|(own, force)| *own += weight * force);
+            }
+        }
+        Ok(())
+    }
+
+    /// The force on a node, mN: its part of those at points and of `on_nodes` `[count,3]`.
+    pub(super) fn on(&self, node: usize, on_nodes: Option<&[f32]>) -> [f32; 3] {
+        let (from, part) = (self.parent(node), self.takes.get(node).unwrap_or(&1.0));
+        [0, 1, 2].map(|axis| {
+            let own = on_nodes.map_or(0.0, |forces| forces[3 * from + axis]);
+            part * (own + self.at_points.get(3 * from + axis).unwrap_or(&0.0))
+        })
+    }
+}
