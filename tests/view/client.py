@@ -176,7 +176,8 @@ class Browser:
             if value:
                 return value
             time.sleep(0.05)
-        state = self.run("return JSON.stringify(window.uptView)")
+        short = "(_, value) => (Array.isArray(value) ? value.slice(0, 3) : value)"
+        state = self.run(f"return JSON.stringify(window.uptView, {short})")
         raise TimeoutError(f"{condition}: {state}")
 
     def drag(self, points: list[tuple[int, int]], release: bool) -> None:

@@ -5,6 +5,7 @@ import { File } from "node:buffer";
 import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { press } from "./press.mjs";
+import { runTests } from "./tests.mjs";
 
 const [root, wasm, native] = process.argv.slice(2);
 const { load, UptError } = await import(join(root, "web/src/index.js"));
@@ -338,16 +339,4 @@ function rollouts() {
   });
 }
 
-let [passed, failed] = [0, 0];
-for (const [name, test] of Object.entries(tests)) {
-  try {
-    await test();
-    passed += 1;
-    console.log(`passed: ${name}`);
-  } catch (error) {
-    failed += 1;
-    console.log(`FAILED: ${name}\n${error.stack}`);
-  }
-}
-console.log(`${passed} passed, ${failed} failed, 0 skipped`);
-process.exitCode = failed ? 1 : 0;
+await runTests(tests);

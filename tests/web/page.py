@@ -8,35 +8,26 @@ Pictures go to web/pictures/ in UPT_BUILD_DIR. The last line is `N passed, N fai
 from __future__ import annotations
 
 import gzip
+import json
 import os
 import shutil
 import sys
-import threading
 import traceback
 from collections.abc import Callable
 from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests/view"))
 
 from client import Browser  # noqa: E402
+from host import Files, Isolated, serve  # noqa: E402
 
 PICTURES = Path(os.environ.get("UPT_BUILD_DIR", ROOT / "target")) / "web/pictures"
 
 
-class Files(SimpleHTTPRequestHandler):
-    """A static host that compresses nothing; says nothing, and counts what it sends."""
-
-    sent = 0
-
-    def log_message(self, *_: object) -> None:
-        pass
-
-    def copyfile(self, source, outputfile) -> None:
-        Files.sent += os.fstat(source.fileno()).st_size
-        super().copyfile(source, outputfile)
+def size(name: str) -> int:
+    return (Path(sys.argv[1]) / "bundles/liver" / name).stat().st_size
 
 
 def shown(browser: Browser, address: str, name: str) -> tuple[int, int]:
@@ -124,6 +115,40 @@ def little_is_loaded(browser: Browser, address: str) -> None:
     assert 1e6 < rest < 4e6 - 0.8e6 - text / 3, (Files.sent, text, rest)
 
 
+def what_has_come_is_kept(browser: Browser, address: str) -> None:
+    """The next visit asks for the manifest alone; and a file whose answer ends in the middle is taken up there."""
+    bundle = set(path.name for path in (Path(sys.argv[1]) / "bundles/liver").glob("*.gz"))
+
+    def visit() -> list[tuple[str, str | None]]:
+        Files.asked.clear()
+        shown(browser, f"{address}?kept", "kept")
+        return [one for one in Files.asked if one[0] in bundle]
+
+    browser.open(f"{address}bundles.json")
+    browser.run("caches.delete('libupt-1').then(() => { window.forgotten = true; })")
+    browser.wait("window.forgotten")
+    large = "prior.safetensors.gz"
+    Files.breaks.add(large)
+    Files.asked.clear()
+    browser.open(f"{address}?kept")
+    # All but half of it has come.
+    files = json.loads((ROOT / "onnx/liver-coarse/bundle.json").read_text(encoding="utf-8"))["files"]
+    sizes = {name: file["bytes"] for name, file in files.items()}
+    come = 100 - 50 * sizes[large.removesuffix(".gz")] / sum(sizes.values())
+    browser.wait(f"Number(/: (\\d+) %/.exec(document.body.innerText)?.[1]) > {come - 2}")
+    Files.may_end.set()
+    browser.wait("window.uptView && uptView.shown > 10")
+    first, again = [range for name, range in Files.asked if name == large]
+    assert first is None and 0 < int(again.removeprefix("bytes=").removesuffix("-")) <= size(large) // 2, again
+    browser.run(
+        "window.kept = 0;"
+        "window.count = () => caches.open('libupt-1').then((cache) => cache.keys())"
+        "  .then((all) => { window.kept = all.length; });"
+    )
+    browser.wait(f"count() && kept > {len(bundle)}")  # the large one is in two pieces
+    assert visit() == [("bundle.json.gz", None)], Files.asked
+
+
 def errors_are_told(browser: Browser, address: str) -> None:
     """A bundle that is not there, one that is damaged, a NaN, and a tissue that is closed."""
     browser.open(address)
@@ -139,6 +164,45 @@ def errors_are_told(browser: Browser, address: str) -> None:
         "UPT_ERR_HANDLE: the tissue",
     ]
     assert len(said) == len(wanted) and all(word in one for one, word in zip(said, wanted, strict=True)), said
+
+
+def frames_are_shared_where_the_page_is_isolated(browser: Browser, address: str) -> None:
+    """With COOP and COEP frames lie in memory that the worker writes in turn; else, and if asked, each has its own."""
+    script = """
+        window.found = undefined;
+        (async () => {
+          const { Tissue } = await import(new URL("libupt/worker.js", location.href));
+          const found = { isolated: crossOriginIsolated };
+          for (const shared of [true, false]) {
+            const tissue = await Tissue.open("bundles/liver", { gzip: true, shared });
+            await tissue.attach(tissue.positions.slice(0, 6));
+            const frames = [];
+            const far = { position: [500, 0, 0], radius: 5 };
+            for (let i = 0; i < 7; i += 1) frames.push(await tissue.frame([far]));
+            const kind = frames[0].displacement.buffer.constructor.name;
+            frames[0].displacement[0] = 77;
+            frames[1].points[0] = 78;
+            const which = (frame) => Number(frame.displacement[0] === 77) + 2 * Number(frame.points[0] === 78);
+            const same = frames.map(which).join("");
+            const { length } = tissue.positions;
+            const sizes = frames.every((one) => one.displacement.length === length && one.points.length === 6);
+            found[shared] = [tissue.isShared, kind, same, sizes].join();
+            tissue.close();
+          }
+          window.found = found;
+        })().catch((error) => { window.found = String(error.stack); });
+    """
+    own = "false,ArrayBuffer,1200000,true"
+    server, isolated = serve(sys.argv[1], Isolated)
+    try:
+        for place, shared in [(isolated, "true,SharedArrayBuffer,1201201,true"), (address, own)]:
+            browser.open(place)
+            browser.run(script)
+            found = browser.wait("window.found")
+            assert found == {"isolated": place == isolated, "true": shared, "false": own}, found
+        a_drag_presses(browser, isolated, "isolated")
+    finally:
+        server.shutdown()
 
 
 def the_example_moves(browser: Browser, address: str) -> None:
@@ -197,9 +261,7 @@ def on(browser: Browser, test: Callable, *arguments: str) -> tuple[str, Callable
 
 def main() -> int:
     PICTURES.mkdir(parents=True, exist_ok=True)
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Files, directory=sys.argv[1]))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    address = f"http://127.0.0.1:{server.server_address[1]}/"
+    server, address = serve(sys.argv[1])
     try:
         desk, phone = Browser(), Browser(390, 844, phone=True)
     except FileNotFoundError as missing:
@@ -207,7 +269,9 @@ def main() -> int:
         return 0
     runs = [
         on(desk, little_is_loaded, address),
+        on(desk, what_has_come_is_kept, address),
         on(desk, errors_are_told, address),
+        on(desk, frames_are_shared_where_the_page_is_isolated, address),
         on(desk, a_drag_presses, address, "liver"),
         on(desk, a_recording_comes_again, address, "liver"),
         on(desk, a_grasp_pulls, address, "liver"),

@@ -16,10 +16,29 @@ export function load(options?: LoadOptions): Promise<Upt>;
 /** Where a bundle is: the address of its folder, `File`s, or bytes by name. */
 export type BundleSource = string | URL | Iterable<File> | Record<string, ArrayBuffer | ArrayBufferView>;
 
+/** Where what has come of bundles is kept by name; a `Map` is one. */
+export interface Store {
+  /** What is kept under a name. */
+  get(name: string): Uint8Array | undefined | Promise<Uint8Array | undefined>;
+  /** Keeps it. */
+  set(name: string, bytes: Uint8Array): unknown;
+  /** Keeps it no longer. */
+  delete(name: string): unknown;
+}
+
+/** Forgets the bundles that this browser keeps. */
+export function forgetBundles(): Promise<void>;
+
 /** How a bundle is opened. */
 export interface OpenOptions {
   /** In place of the browser's `fetch`. */
-  fetch?: (url: URL) => Promise<Response>;
+  fetch?: (url: URL, options?: RequestInit) => Promise<Response>;
+  /** Where the files of an address are kept, by their hashes; by default the browser's Cache API, in Node nowhere. false: nowhere. */
+  cache?: boolean | Store;
+  /** The files lie there as `NAME.gz`, for hosts that compress nothing. */
+  gzip?: boolean;
+  /** What `bundle.json` must have, such as the entry of an index. */
+  sha256?: string;
   /** Called as files come: bytes so far, and of all. */
   progress?: (done: number, total: number) => void;
   /** The same bits as on every other machine, for replays and lockstep. */

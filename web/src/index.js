@@ -3,7 +3,7 @@ import * as abi from "./abi.js";
 import { files } from "./files.js";
 import { get } from "./get.js";
 import { Module, UptError } from "./module.js";
-
+export { forgetBundles } from "./store.js";
 export { UptError };
 
 const MODES = { slide: abi.UPT_MODE_SLIDE, grasp: abi.UPT_MODE_GRASP };
@@ -46,18 +46,8 @@ class Upt {
   async open(source, { portable = false, ...options } = {}) {
     const given = await files(source, options);
     const { module } = this;
-    for (const [name, bytes] of given) {
-      const at = module.withText(name, (text) => module.call("upt_host_file", text, bytes.byteLength));
-      if (at === 0) throw new UptError("UPT_ERR_OUT_OF_MEMORY", module.text(module.call("upt_last_error")));
-      module.bytes(at, bytes.byteLength).set(bytes);
-    }
-    return new Model(
-      module,
-      module.withRoom(abi.upt_model_options.size, (at) => {
-        module.write(at, abi.upt_model_options, { portable: portable ? 1 : 0 });
-        return module.out("upt_host_open", at);
-      }),
-    );
+    module.giveFiles(given);
+    return new Model(module, module.openFiles({ portable: portable ? 1 : 0 }));
   }
 }
 

@@ -17,8 +17,8 @@ const NAMES = new Map(Object.entries(abi).filter(([name]) => name === "UPT_PENDI
 const PROBE = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11];
 
 async function compile(source) {
-  if (source instanceof WebAssembly.Module) return source;
   const response = await source;
+  if (response instanceof WebAssembly.Module) return response;
   if (!(response instanceof Response)) return WebAssembly.compile(response);
   if (!response.ok) throw new UptError("UPT_ERR_IO", `${response.url}: ${response.status} ${response.statusText}`);
   // Servers that do not know the type of .wasm files send another one, and then nothing is compiled while it arrives.
@@ -142,6 +142,23 @@ export class Module {
     this.write(this.#scratch, layout, {});
     this.run(name, ...parameters, this.#scratch);
     return this.read(this.#scratch, layout);
+  }
+
+  /** Files of the bundle that is opened next: name and bytes. */
+  giveFiles(list) {
+    for (const [name, bytes] of list) {
+      const at = this.withText(name, (text) => this.call("upt_host_file", text, bytes.byteLength));
+      if (at === 0) throw new UptError("UPT_ERR_OUT_OF_MEMORY", this.text(this.call("upt_last_error")));
+      this.bytes(at, bytes.byteLength).set(bytes);
+    }
+  }
+
+  /** Opens their bundle: a model's handle. */
+  openFiles(options) {
+    return this.withRoom(abi.upt_model_options.size, (at) => {
+      this.write(at, abi.upt_model_options, options);
+      return this.out("upt_host_open", at);
+    });
   }
 
   /** Writes a struct: zeros, its size, and these fields. */

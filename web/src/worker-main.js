@@ -1,6 +1,8 @@
 // The worker's side of worker.js: owns the library, keeps step with the clock, answers one question after another.
 import { Clock, between } from "./clock.js";
+import { files } from "./files.js";
 import { load } from "./index.js";
+import { Outbox } from "./outbox.js";
 import { Surgery, isCutting } from "./surgery.js";
 
 const LONGEST_RECORDING = 45_000; // steps: a quarter of an hour of 20 ms
@@ -8,6 +10,7 @@ const LONGEST_RECORDING = 45_000; // steps: a quarter of an hour of 20 ms
 let scene;
 let surgery;
 let clock;
+let outbox;
 let dt;
 let framed = 0; // when the last frame was made, s
 let timer;
@@ -21,19 +24,21 @@ let failed; // what a step between two questions ended with
 
 const now = () => performance.now() / 1000;
 
-// A response whose bytes come compressed, for hosts that compress nothing themselves.
-async function unpacked(url, type) {
+// The module, which comes compressed from hosts that compress nothing themselves.
+async function unpacked(url) {
   const response = await fetch(`${url}`.replace(/(\?|$)/, ".gz$1"));
   if (!response.ok) return response;
-  return new Response(response.body.pipeThrough(new DecompressionStream("gzip")), { headers: { "content-type": type } });
+  return new Response(response.body.pipeThrough(new DecompressionStream("gzip")), { headers: { "content-type": "application/wasm" } });
 }
 
 const answers = {
-  async open({ source, scene: options = {}, wasm, isa, gzip }) {
+  async open({ source, scene: options = {}, wasm, isa, shared, ...more }) {
+    outbox = new Outbox(shared);
     const address = wasm ?? new URL("./upt.wasm", import.meta.url);
-    const upt = await load({ wasm: address instanceof WebAssembly.Module ? address : gzip ? unpacked(address, "application/wasm") : fetch(address), isa });
-    const get = gzip ? (url) => unpacked(url, "application/octet-stream") : fetch.bind(globalThis);
-    const model = await upt.open(source, { fetch: get, progress: (...progress) => postMessage({ progress }) });
+    const module = address instanceof WebAssembly.Module ? address : more.gzip ? unpacked(address) : fetch(address);
+    const bundle = files(source, { ...more, progress: (...progress) => postMessage({ progress }) });
+    const [upt, given] = await Promise.all([load({ wasm: module, isa }), bundle]);
+    const model = await upt.open(given, more);
     const { info } = model;
     dt = options.stepSeconds ?? info.frame_step_s;
     // No correction begins after this share of a step, so that steps keep up with the clock.
@@ -50,7 +55,7 @@ const answers = {
     const faces = model.indices("surfaceFaces").map((node) => place.get(node));
     scene.setRegion(nodes);
     last = measured([]);
-    return { info: { ...info, name: model.describe().name }, nodes, positions, faces, domain, stepSeconds: dt };
+    return { info: { ...info, name: model.describe().name }, nodes, positions, faces, domain, stepSeconds: dt, isShared: outbox.isShared };
   },
 
   frame(given) {
@@ -66,9 +71,10 @@ const answers = {
     const surface = surgery.news();
     let displacement;
     let points;
+    outbox.begin();
     try {
-      displacement = scene.present(clock.since(framed), pressing, { surface: surgery.begun }).slice();
-      points = attached ? scene.present(clock.since(framed), pressing, { points: true }).slice() : undefined;
+      displacement = outbox.put(scene.present(clock.since(framed), pressing, { surface: surgery.begun }));
+      points = attached ? outbox.put(scene.present(clock.since(framed), pressing, { points: true })) : undefined;
     } catch (error) {
       if (surface) surgery.repeat();
       throw error;
@@ -147,8 +153,7 @@ onmessage = async ({ data: { what, value, number } }) => {
   try {
     if (failed) throw failed;
     const answer = await answers[what](value);
-    const moved = answer?.displacement ?? answer?.positions;
-    postMessage({ number, value: answer }, moved ? [moved.buffer] : []);
+    postMessage({ number, value: answer }, what === "frame" ? outbox.handedOver : what === "open" ? [answer.positions.buffer] : []);
   } catch (error) {
     failed = undefined;
     postMessage({ number, error: { status: error.status ?? "UPT_ERR_STATE", message: error.message } });

@@ -10,6 +10,14 @@ export interface TissueOptions {
   gzip?: boolean;
 /** Called as files come: bytes so far, and of all. */
   progress?: (done: number, total: number) => void;
+  /** false: each frame has arrays of its own, also where the page is isolated and they could be shared. */
+  shared?: boolean;
+  /** false: nothing is kept for the next visit. */
+  cache?: boolean;
+  /** What `bundle.json` must have, such as the entry of an index. */
+  sha256?: string;
+  /** The same bits as on every other machine, for replays and lockstep. */
+  portable?: boolean;
   /** In place of the package's own, for bundlers that need to see `new Worker(...)`. */
   worker?: Worker;
 }
@@ -60,7 +68,7 @@ export interface SurgeryState {
   refused?: string;
 }
 
-/** The tissue of one picture. */
+/** The tissue of one picture. Where the page is isolated (COOP, COEP), `displacement` and `points` are in memory that the worker writes again three frames later. */
 export interface Frame {
   /** Of the surface's nodes [n,3], mm; from the first stroke of a tool that cuts on, of the vertices of `surface`. */
   displacement: Float32Array;
@@ -102,6 +110,8 @@ export class Tissue {
   readonly domain: Uint32Array;
 /** Length of a step, s. */
   readonly stepSeconds: number;
+  /** Whether frames lie in memory that the worker shares. */
+  readonly isShared: boolean;
   /** The tissue of this moment. Ask for one for each picture; without frames there are no steps. */
   frame(instruments?: Tool[]): Promise<Frame>;
   /** Points [p,3] at rest, mm, whose displacements each frame has from here on. */

@@ -20,15 +20,17 @@ export class Tissue {
   domain;
   /** Length of a step, s. */
   stepSeconds;
+  /** Whether frames lie in memory that the worker shares. */
+  isShared;
 
   /** Starts a worker and opens a bundle there: its address, `File`s, or bytes by name. */
-  static async open(source, { scene, wasm, isa, gzip, progress, worker } = {}) {
+  static async open(source, { progress, worker, ...options } = {}) {
     const tissue = new Tissue();
     tissue.#worker = worker ?? new Worker(new URL("./worker-main.js", import.meta.url), { type: "module" });
     tissue.#worker.onmessage = ({ data }) => tissue.#answer(data, progress);
     tissue.#worker.onerror = (event) => tissue.#end(new UptError("UPT_ERR_STATE", event.message || "the worker could not be started"));
     const folder = typeof source === "string" || source instanceof URL ? new URL(source, globalThis.location?.href).href : source;
-    const made = await tissue.#ask("open", { source: folder, scene, wasm, isa, gzip });
+    const made = await tissue.#ask("open", { source: folder, ...options });
     return Object.assign(tissue, made);
   }
 
