@@ -48,6 +48,10 @@ mcs "${mcs_flags[@]}" -nowarn:0649 -target:library -out:"$build/Upt.Editor.dll" 
   -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" "$plugin"/Editor/*.cs
 mcs "${mcs_flags[@]}" -define:ENABLE_LEGACY_INPUT_MANAGER -nowarn:0649 -target:library -out:"$build/Upt.Samples.dll" -r:"$build/Upt.Interop.dll" \
   -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" "$plugin"/Samples~/*/*.cs
+# As Unity compiles them for a WebGL player, whose calls tests/web/unity.mjs runs.
+mcs "${mcs_flags[@]}" -define:UNITY_WEBGL -target:library -out:"$build/Web.Interop.dll" "$plugin"/Runtime/Interop/*.cs
+mcs "${mcs_flags[@]}" -define:UNITY_WEBGL -nowarn:0649 -target:library -out:"$build/Web.dll" -r:"$build/Web.Interop.dll" \
+  -r:"$build/UnityEngine.Stub.dll" "$plugin"/Runtime/Components/*.cs
 mcs "${mcs_flags[@]}" -target:library -out:"$build/Upt.Tests.dll" -r:"$nunit" -r:"$build/Upt.Interop.dll" \
   -r:"$build/UnityEngine.Stub.dll" -r:"$build/Upt.dll" -r:"$build/Upt.Samples.dll" "$root"/tests/csharp/tests/*.cs "$plugin"/Tests/Runtime/*.cs
 mcs "${mcs_flags[@]}" -target:exe -out:"$build/MissingLibrary.exe" -r:"$build/Upt.Interop.dll" \

@@ -44,6 +44,7 @@ add() {
 echo "== in Node"
 add node tests/web/node.mjs "$root" "$UPT_WASM" "$build"
 add node tests/web/download.mjs "$root" "$UPT_WASM"
+add node tests/web/unity.mjs "$root" "$UPT_WASM"
 upt="${UPT_PROGRAM:-$root/target/release/upt}"
 if [ -x "$upt" ]; then
   check "what the module records has the bits of $(uname -m)'s" "$upt" replay "$build/module.replay" --bundle onnx/liver-coarse --verify

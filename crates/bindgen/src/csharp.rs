@@ -16,6 +16,16 @@ namespace Upt.Interop
 {
 ";
 
+/// Unity links a WebGL player's own code, and `Plugins/WebGL/libupt.jslib` as that.
+const LIBRARY: &str = "\
+#if UNITY_WEBGL && !UNITY_EDITOR
+        const string Library = \"__Internal\";
+#else
+        const string Library = \"upt\";
+#endif
+
+";
+
 /// The whole file.
 pub fn write(source: &Source) -> Result<String> {
     let mut out = String::from(HEAD);
@@ -29,7 +39,7 @@ pub fn write(source: &Source) -> Result<String> {
     }
     out.push_str("    /// <summary>The C ABI, as it is.</summary>\n");
     out.push_str("    public static unsafe class Native\n    {\n");
-    out.push_str("        const string Library = \"upt\";\n\n");
+    out.push_str(LIBRARY);
     for constant in &source.constants {
         summary(&mut out, 8, &constant.doc);
         let (name, value) = (&constant.name, &constant.value);

@@ -184,9 +184,15 @@ namespace Upt
         private void OnEnable()
         {
             failed = false;
+            Begin();
+        }
+
+        // Where a model comes from the web, once it is here.
+        private void Begin()
+        {
             try
             {
-                Open();
+                if (model == null || model.IsReady) Open();
             }
             catch (Exception error)
             {
@@ -202,6 +208,7 @@ namespace Upt
 
         private void Update()
         {
+            if (scene == null && !failed) Begin();
             if (!IsRunning) return;
             using (FrameMarker.Auto())
             {

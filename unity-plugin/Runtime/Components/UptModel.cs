@@ -32,6 +32,20 @@ namespace Upt
             }
         }
 
+        /// <summary>Whether the model can be opened. In a WebGL player its files come from the web: the first question fetches them and the library,
+        /// and a <see cref="SoftTissue"/> begins once they are here. Throws <see cref="UptException"/> where they are not to be had.</summary>
+        public bool IsReady
+        {
+            get
+            {
+#if UNITY_WEBGL && !UNITY_EDITOR
+                return model != null || WebBundle.IsReady(Application.streamingAssetsPath + "/libupt", ResolvedPath);
+#else
+                return true;
+#endif
+            }
+        }
+
         /// <summary>Opens the model if it is not open; each call is paired with
         /// <see cref="Release"/>.</summary>
         public Model Acquire()
@@ -39,10 +53,12 @@ namespace Upt
             if (model == null)
             {
                 string path = ResolvedPath;
+#if !UNITY_WEBGL || UNITY_EDITOR
                 if (!Directory.Exists(path))
                     throw new DirectoryNotFoundException(
                         "libupt bundle '" + path + "' does not exist: copy a bundle folder (onnx/brain) into " +
                         "StreamingAssets, or set an absolute path on the UptModel asset '" + name + "'");
+#endif
                 model = new Model(path, (uint)Math.Max(0, threads));
             }
             users++;

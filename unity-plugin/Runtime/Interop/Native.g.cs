@@ -942,7 +942,11 @@ namespace Upt.Interop
     /// <summary>The C ABI, as it is.</summary>
     public static unsafe class Native
     {
+#if UNITY_WEBGL && !UNITY_EDITOR
+        const string Library = "__Internal";
+#else
         const string Library = "upt";
+#endif
 
         /// <summary>Success.</summary>
         public const upt_status UPT_OK = upt_status.UPT_OK;

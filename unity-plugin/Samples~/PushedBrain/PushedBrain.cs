@@ -26,6 +26,7 @@ namespace Upt.Samples
         private Vector3 site;
         private Vector3 outward;
         private float time;
+        private bool found;
 
         /// <summary>The tissue that the sample made.</summary>
         public SoftTissue Tissue
@@ -44,6 +45,7 @@ namespace Upt.Samples
             brain.SetActive(false);
             brain.AddComponent<MeshFilter>();
             brain.AddComponent<MeshRenderer>().sharedMaterial = Paint(new Color(0.86f, 0.62f, 0.58f));
+            found = false;
             tissue = brain.AddComponent<SoftTissue>();
             tissue.model = model;
             tissue.unitsPerMillimetre = UnitsPerMillimetre;
@@ -55,6 +57,13 @@ namespace Upt.Samples
             tissue.instruments.Add(spatula);
             ShowBlade(tool.transform);
             brain.SetActive(true);
+            if (tissue.IsRunning) Find();
+        }
+
+        /// <summary>The place to press, once the tissue runs: in a WebGL player it comes from the web first.</summary>
+        private void Find()
+        {
+            found = true;
             tissue.DomainMiddle(out site, out outward);
             Look();
         }
@@ -68,6 +77,7 @@ namespace Upt.Samples
         private void Update()
         {
             if (tissue == null || !tissue.IsRunning) return;
+            if (!found) Find();
             time += Time.deltaTime;
             float press = 0.5f - 0.5f * (float)System.Math.Cos(2.0 * System.Math.PI * time / period);
 #if ENABLE_LEGACY_INPUT_MANAGER
