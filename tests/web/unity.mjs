@@ -145,6 +145,16 @@ const tests = {
     }
   },
 
+  async pointers_in_structs_are_known() {
+    const source = readFileSync(join(root, "web/src/unity.js"), "utf8");
+    const known = new Map([...source.matchAll(/^  (upt_\w+): \{(.*?)\},?$/gms)].map(([, name, fields]) => [name, fields]));
+    for (const [, name, body] of native.matchAll(/public unsafe struct (upt_\w+)\s*\{(.*?)\n {4}\}/gs)) {
+      if (name === "upt_model_options") continue; // read by itself
+      for (const [, field] of body.matchAll(/public \w+\* (\w+);/g)) assert.match(known.get(name) ?? "", new RegExp(`\\b${field}: `), name);
+    }
+    assert.ok(known.get("upt_input").includes("instruments: "));
+  },
+
   async a_rollout_has_the_bits_of_the_module_alone() {
     const upt = await load({ wasm: await WebAssembly.compile(readFileSync(wasm)) });
     const alone = await upt.open(ADDRESS, { portable: true });

@@ -24,6 +24,7 @@ upt_model_read_positions model out:>u32*count count:l
 upt_model_read_indices model set out:>u32*capacity capacity:l needed:>u64
 upt_model_read_support model group name:>u8*name_capacity name_capacity:l nodes:>u32*node_capacity node_capacity:l needed:>u64
 upt_model_read_region model region name:>u8*name_capacity name_capacity:l nodes:>u32*node_capacity node_capacity:l needed:>u64
+upt_model_locate_points model places:<u32*3*count count:l nodes:>u32*4*count weights:>u32*4*count
 upt_scene_create model options:<upt_scene_options out:>u32
 upt_scene_destroy scene
 upt_scene_reset scene
@@ -85,6 +86,7 @@ const INNER = {
     pressures: "upt_pressure*pressure_count",
     ties: "upt_tie*tie_count",
     supports: "upt_support*support_count",
+    point_forces: "upt_point_force*point_force_count",
   },
   upt_pressure: { nodes: "u32*node_count" },
   upt_bed: { nodes: "u32*node_count" },

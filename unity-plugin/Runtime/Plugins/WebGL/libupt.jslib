@@ -139,6 +139,10 @@ var libupt = {
   upt_model_read_region: function () {
     return Libupt.call("upt_model_read_region", arguments);
   },
+  upt_model_locate_points__deps: ["$Libupt"],
+  upt_model_locate_points: function () {
+    return Libupt.call("upt_model_locate_points", arguments);
+  },
   upt_scene_create__deps: ["$Libupt"],
   upt_scene_create: function () {
     return Libupt.call("upt_scene_create", arguments);
