@@ -70,7 +70,31 @@ fn module(workspace: &Workspace, features: &str) -> Result<PathBuf> {
         &mut workspace.cargo(&words),
     )?;
     let target = workspace.release.with_file_name("");
-    Ok(target.join(TARGET).join("web/upt.wasm"))
+    let made = target.join(TARGET).join("web/upt.wasm");
+    let bare = made.with_file_name("upt.bare.wasm");
+    let bytes = std::fs::read(&made).with_context(|| made.display().to_string())?;
+    std::fs::write(
+        &bare,
+        without_names(&bytes).context("the module's sections")?,
+    )?;
+    Ok(bare)
+}
+
+/// A module without its custom sections: the names of its functions, 5 % of it, which the linker leaves there. `None` where a section's length is no number.
+fn without_names(module: &[u8]) -> Option<Vec<u8>> {
+    let (head, mut rest) = module.split_at_checked(8)?;
+    let mut bare = head.to_vec();
+    while let Some((&kind, after)) = rest.split_first() {
+        let digits = 1 + after.iter().position(|byte| byte & 0x80 == 0)?;
+        let number = after[..digits].iter().rev();
+        let length = number.fold(0, |sum, byte| sum << 7 | usize::from(byte & 0x7f));
+        let (section, next) = rest.split_at_checked(1 + digits + length)?;
+        if kind != 0 {
+            bare.extend_from_slice(section);
+        }
+        rest = next;
+    }
+    Some(bare)
 }
 
 fn has_target(workspace: &Workspace) -> bool {
@@ -213,4 +237,19 @@ pub fn stage(workspace: &Workspace) -> Result<Outcome> {
         ("UPT_NPM", &*npm),
     ];
     counts::script(workspace, "web", "tests/web/run.sh", &environment)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn custom_sections_are_left_out() {
+        let head = [0, 97, 115, 109, 1, 0, 0, 0];
+        let long = [&[0u8, 0x82, 0x01][..], &[7; 130]].concat(); // custom, of 130 bytes
+        let types = [1u8, 4, 1, 0x60, 0, 0];
+        let whole = [&head[..], &long, &types, &[0, 1, 0]].concat();
+        assert_eq!(without_names(&whole), Some([&head[..], &types].concat()));
+        assert_eq!(without_names(&whole[..20]), None);
+    }
 }
