@@ -64,6 +64,26 @@ first_page() (
 check "README of the package runs in Node" first_page
 same_words() { diff <(sed -n '/^```js first$/,/^```$/p' web/README.md) <(sed -n '/^```js first$/,/^```$/p' docs/guide/web.md); }
 check "the guide begins with the same program" same_words
+echo "== React three fiber: types and build, with packages of npm that stay between runs"
+react="${UPT_BUILD_DIR:-$root/target}/web/react"
+mkdir -p "$react"
+react_packages() (
+  cmp -s examples/web/react/package.json "$react/package.json" && exit 0
+  cp examples/web/react/package.json "$react/wanted.json" && cd "$react" || exit 1
+  cp wanted.json package.json
+  # What is there in part is no better than nothing.
+  timeout 120 npm install --silent --no-audit --no-fund --no-package-lock || { rm -f package.json; exit 1; }
+)
+react_built() (
+  cp examples/web/react/*.tsx examples/web/react/*.json examples/web/react/*.html "$react" && cd "$react" || exit 1
+  mkdir -p node_modules/libupt && cp -r "$UPT_NPM"/* node_modules/libupt && npm run --silent check && npm run --silent build
+)
+if react_packages; then
+  check "the example for React three fiber has right types, and builds" react_built
+  export UPT_REACT="$react"
+else
+  leave_out 2 "the example for React three fiber: npm has no packages here"
+fi
 echo "== in a browser"
 add python3 tests/web/page.py "$UPT_SITE"
 

@@ -1,0 +1,57 @@
+// A ball follows the pointer over a liver and presses it: libupt steps in a worker, React three fiber draws.
+import { Canvas, useFrame, type ThreeEvent } from "@react-three/fiber";
+import { SoftTissue } from "libupt/three";
+import { Tissue, type Tool } from "libupt/worker";
+import { Suspense, use, useEffect, useMemo, useRef } from "react";
+import { createRoot } from "react-dom/client";
+import { Vector3, type Mesh } from "three";
+
+const RADIUS = 6; // mm
+const DEPTH = 4;
+
+// A bundler that moves files leaves the worker where the package has it.
+const worker = new Worker(new URL("node_modules/libupt/worker-main.js", location.href), { type: "module" });
+const opening = Tissue.open("bundles/liver", { worker });
+
+function Organ({ tissue }: { tissue: Tissue }) {
+  const organ = useMemo(() => new SoftTissue(tissue), [tissue]);
+  const ball = useRef<Mesh>(null);
+  const tools = useRef<Tool[]>([]);
+  useEffect(() => () => organ.dispose(), [organ]);
+  useFrame(() => void organ.update(tools.current));
+
+  const press = ({ point, face }: ThreeEvent<PointerEvent>) => {
+    const outward = face?.normal ?? new Vector3(0, 0, 1);
+    const place = point.clone().addScaledVector(outward, RADIUS - DEPTH);
+    ball.current?.position.copy(place);
+    tools.current = [{ position: place.toArray(), radius: RADIUS, friction: 0.1 }];
+  };
+  Object.assign(window, { tissue, organ, tools }); // for the console
+  return (
+    <>
+      <primitive object={organ} onPointerMove={press} onPointerOut={() => (tools.current = [])} />
+      <mesh ref={ball}>
+        <sphereGeometry args={[RADIUS, 24, 16]} />
+        <meshStandardMaterial color="#9fb4c8" metalness={0.6} roughness={0.35} />
+      </mesh>
+    </>
+  );
+}
+
+function Page() {
+  return (
+    <Canvas camera={{ position: [0, -20, 420], near: 1, far: 2000, fov: 35 }}>
+      <ambientLight intensity={0.9} />
+      <directionalLight position={[100, 100, 400]} intensity={2.2} />
+      <Suspense fallback={null}>
+        <Opened />
+      </Suspense>
+    </Canvas>
+  );
+}
+
+function Opened() {
+  return <Organ tissue={use(opening)} />;
+}
+
+createRoot(document.getElementById("root")!).render(<Page />);
