@@ -34,11 +34,25 @@ def tail() -> str:
     return "  externalObjects: {}\n  userData: \n  assetBundleName: \n  assetBundleVariant: \n"
 
 
-def native(path: str) -> str:
-    system, cpu, target = NATIVE[path]
+def plugin() -> list[str]:
+    """A plugin of no platform yet."""
     rows = ["PluginImporter:", "  externalObjects: {}", "  serializedVersion: 2", "  isPreloaded: 0"]
     rows += ["  isOverridable: 0", "  isExplicitlyReferenced: 0", "  validateReferences: 1", "  platformData:"]
-    rows += ["  - first:", "      Any: ", "    second:", "      enabled: 0", "      settings: {}"]
+    return [*rows, "  - first:", "      Any: ", "    second:", "      enabled: 0", "      settings: {}"]
+
+
+def jslib() -> str:
+    """What Emscripten links into WebGL players, and the editor does not load."""
+    rows = plugin()
+    rows += ["  - first:", "      Editor: Editor", "    second:", "      enabled: 0", "      settings:"]
+    rows += ["        DefaultValueInitialized: true"]
+    rows += ["  - first:", "      WebGL: WebGL", "    second:", "      enabled: 1", "      settings: {}"]
+    return "\n".join([*rows, "  userData: ", "  assetBundleName: ", "  assetBundleVariant: ", ""])
+
+
+def native(path: str) -> str:
+    system, cpu, target = NATIVE[path]
+    rows = plugin()
     rows += ["  - first:", "      Editor: Editor", "    second:", "      enabled: 1", "      settings:"]
     rows += [f"        CPU: {cpu}", f"        OS: {system}"]
     rows += ["  - first:", f"      Standalone: {target}", "    second:", "      enabled: 1", "      settings:"]
@@ -49,6 +63,8 @@ def native(path: str) -> str:
 def content(path: str, folder: bool) -> str:
     if path in NATIVE:
         return head(path) + native(path)
+    if path.endswith(".jslib"):
+        return head(path) + jslib()
     if folder:
         return head(path) + "folderAsset: yes\nDefaultImporter:\n" + tail()
     if path.endswith(".cs"):
