@@ -61,6 +61,12 @@ KINDS = [
     Kind("libupt-{v}-py3-none-manylinux_2_35_aarch64.whl", ("upt/lib/libupt.so", ORGAN), (LEARNED,), (X86, COMMAND)),
     Kind("libupt-{v}-py3-none-win_amd64.whl", ("upt/lib/upt.dll", ORGAN), (WINDOWS, LEARNED), (COMMAND,)),
     Kind("libupt-{v}-py3-none-macosx_11_0_arm64.whl", ("upt/lib/libupt.dylib", ORGAN), (LEARNED,), (X86, WINDOWS)),
+    Kind(
+        "libupt-godot-{v}-linux-x64.zip",
+        ("addons/libupt/bin/linux-x64/libupt.so.0", "addons/libupt/bundles/liver-coarse/bundle.json"),
+        (LEARNED, "liver-coarse"),
+        (COMMAND, WINDOWS, "onnxruntime"),
+    ),
     Kind("libupt-{v}.tar.gz", ("p/organs/liver-coarse/bundle.json",), (LEARNED, "liver-coarse"), (COMMAND,)),
 ]
 
@@ -73,7 +79,7 @@ def version() -> str:
 
 def lay_down(place: Path, files: list[str]) -> None:
     """A package of stubs."""
-    if place.suffix == ".whl":
+    if place.suffix in (".whl", ".zip"):
         with zipfile.ZipFile(place, "w") as wheel:
             for name in files:
                 wheel.writestr(name, name)

@@ -50,7 +50,7 @@ class Part:
 
 def members(package: Path) -> Iterator[tuple[str, bytes]]:
     """Files of a package, with forward slashes; links are left out."""
-    if package.suffix == ".whl":
+    if package.suffix in (".whl", ".zip"):
         with zipfile.ZipFile(package) as wheel:
             for name in wheel.namelist():
                 yield name, wheel.read(name)
@@ -69,6 +69,8 @@ def is_source(package: Path) -> bool:
 def words(package: Path) -> tuple[str, ...]:
     """What cargo builds for a package, by its name."""
     name = package.name
+    if found := re.fullmatch(r"libupt-godot-[^-]+-(.+)\.zip", name):
+        return ("-p", "libupt", "--target", TARGETS[found[1]])
     if found := re.fullmatch(r"libupt-[^-]+-(.+)\.tar\.gz", name):
         return (*crates.ALL, "--target", TARGETS[found[1]])
     if re.fullmatch(r"libupt-[^-]+\.tgz", name):

@@ -30,6 +30,9 @@ pub struct Options {
     /// Make the Python wheel instead of the archive.
     #[arg(long, conflicts_with = "unity")]
     wheel: bool,
+    /// Make the Godot addon, as the engine's Asset Library takes it, instead of the archive: for Linux x86-64, with Godot 4.3 or newer (GODOT), or fetched.
+    #[arg(long, conflicts_with_all = ["unity", "wheel", "platform"])]
+    godot: bool,
     /// For another platform, with its ONNX Runtime: built here, on Linux x86-64, for Windows, Linux arm64 and macOS (which never ran). `web`: the npm package.
     /// `crates`: the library and its layers as Rust's registry takes them. `sdist`: the source as Python's does.
     #[arg(long, value_parser = wanted)]
@@ -79,9 +82,10 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         Some(Wanted::Native(platform)) => platform,
         Some(Wanted::Crates) | None => Platform::host()?,
     };
-    let made = match (options.wheel, options.unity) {
-        (true, _) => wheel::make(workspace, platform, &out)?,
-        (_, true) => unity(workspace, &out)?,
+    let made = match options {
+        Options { wheel: true, .. } => wheel::make(workspace, platform, &out)?,
+        Options { unity: true, .. } => unity(workspace, &out)?,
+        Options { godot: true, .. } => godot(workspace, &out)?,
         _ => native(workspace, platform, &out)?,
     };
     finish(workspace, made)
@@ -193,6 +197,27 @@ fn install(
     run_checked(workspace, "cmake", &mut configure)?;
     let mut install = workspace.command("cmake", &format!("--install {build}"));
     run_checked(workspace, "cmake --install", &mut install)
+}
+
+/// The Godot addon, with libupt and a liver.
+fn godot(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
+    let host = Platform::host()?;
+    ensure!(
+        host == Platform::LinuxX64,
+        "the addon is made on Linux x86-64"
+    );
+    workspace.build()?;
+    let mut command = workspace.bash("examples/godot/addon.sh");
+    command
+        .arg(out.join("godot"))
+        .env("UPT_LIB_DIR", &workspace.release)
+        .env("UPT_PYTHON", workspace.venv_program("python"))
+        .env("SOURCE_DATE_EPOCH", archive::time(workspace).to_string());
+    run_checked(workspace, "addon", &mut command)?;
+    let name = format!("libupt-godot-{VERSION}-{}.zip", host.name());
+    let file = out.join(&name);
+    std::fs::copy(out.join("godot").join(&name), &file)?;
+    Ok(file)
 }
 
 /// Folders of the plugins in the Unity package: platform, system, processor.
