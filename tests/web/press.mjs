@@ -8,7 +8,7 @@ export function press(upt, model, { steps, corrections, each = () => {} }) {
     const aside = step < 16 ? 0 : step < 24 ? step - 16 : 8;
     const ball = [{ position: [x + 0.5 * aside, y, z + 6 - 0.5 * down], radius: 6, friction: 0.25 }];
     const moved = scene.step(ball).slice();
-    each(scene.stats());
+    each(scene.timing());
     states.push(moved, Float32Array.from(scene.readings()[0].force), scene.present(0.007, ball).slice());
   }
   scene.close();
