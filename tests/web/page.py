@@ -255,6 +255,29 @@ def the_example_moves(browser: Browser, address: str) -> None:
     browser.screenshot(str(PICTURES / "example-cut.png"))
 
 
+def the_react_example_moves(browser: Browser, address: str) -> None:
+    """examples/web/react, built by run.sh: the organ follows the pointer through React three fiber."""
+    there = Path(sys.argv[1]) / "react"
+    shutil.rmtree(there, ignore_errors=True)
+    built = Path(os.environ["UPT_REACT"])
+    shutil.copytree(built / "dist", there / "dist")
+    shutil.copytree(built / "node_modules/libupt", there / "node_modules/libupt")
+    shutil.copy(built / "index.html", there)
+    shutil.copytree(ROOT / "onnx/liver-coarse", there / "bundles/liver")
+    browser.open(f"{address}react/index.html")
+    browser.wait("window.organ && organ.geometry.boundingSphere !== undefined")
+    browser.run("organ.update([]).then(() => { window.begun = true; })")
+    browser.wait("window.begun")
+    width, height = browser.run("return [innerWidth, innerHeight]")
+    x, y = width // 2, height // 2
+    for _ in range(20):
+        browser.move([(x - 20, y), (x, y), (x + 10, y + 5)])
+        if browser.run("return tools.current.length") == 1:
+            break
+    browser.wait("organ.frame?.readings[0]?.contact_count > 0 && Math.max(...organ.frame.displacement) > 0.5")
+    browser.screenshot(str(PICTURES / "react.png"))
+
+
 def on(browser: Browser, test: Callable, *arguments: str) -> tuple[str, Callable]:
     return f"{test.__name__} ({', '.join([browser.pointer, *arguments[1:]])})", partial(test, browser, *arguments)
 
@@ -279,6 +302,8 @@ def main() -> int:
         on(desk, the_example_moves, address),
         on(phone, a_drag_presses, address, "phone"),
     ]
+    if os.environ.get("UPT_REACT"):
+        runs.append(on(desk, the_react_example_moves, address))
     passed = failed = 0
     try:
         for name, test in runs:

@@ -80,8 +80,9 @@ react_built() (
 )
 if react_packages; then
   check "the example for React three fiber has right types, and builds" react_built
+  export UPT_REACT="$react"
 else
-  leave_out 1 "the example for React three fiber: npm has no packages here"
+  leave_out 2 "the example for React three fiber: npm has no packages here"
 fi
 echo "== in a browser"
 add python3 tests/web/page.py "$UPT_SITE"
