@@ -246,6 +246,11 @@ impl Body {
         self.finest() < THIN_MM
     }
 
+    /// Whether it is a hull with a point.
+    pub fn has_point(&self) -> bool {
+        self.pointed
+    }
+
     /// Half the thickness of its thinnest part: its size, or the radius of its point.
     pub fn finest(&self) -> f32 {
         match self.pointed {

@@ -36,7 +36,9 @@ use crate::error::Result;
 /// A step that leaves tissue deeper inside of a tool than this has lost the contact, mm.
 pub(super) const SUNK_MM: f32 = 0.9;
 /// An iteration may leave it so deep, mm.
-pub(super) const KEPT_MM: f32 = 0.5 * SUNK_MM;
+const KEPT_MM: f32 = 0.5 * SUNK_MM;
+/// The same of a needle, whose tip slides to other tissue.
+const KEPT_THIN_MM: f32 = 0.35 * SUNK_MM;
 /// Tools that go less far in a step are followed in one part from the last state, mm.
 const LEAST_WAY_MM: f32 = 0.3;
 /// The response of linear elasticity is not shown where it goes farther than this, mm.
@@ -343,6 +345,15 @@ fn sunk(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) ->
     match problem.next.is_wedged(&problem.past) {
         true => f32::MAX,
         false => problem.depths().sunk(state(input, u), way),
+    }
+}
+
+/// The same over what an iteration may leave.
+fn over_kept(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) -> f32 {
+    let kept = [KEPT_MM, KEPT_THIN_MM];
+    match problem.next.is_wedged(&problem.past) {
+        true => f32::MAX,
+        false => problem.depths().over(state(input, u), way, kept),
     }
 }
 

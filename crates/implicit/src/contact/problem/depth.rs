@@ -39,6 +39,20 @@ impl Depths<'_> {
         deepest
     }
 
+    /// The same over what an iteration may leave: `thin_mm` for a round tool that pierces the surface before it has pushed it, `most_mm` for all others.
+    pub fn over(&mut self, state: State<'_>, part: f32, [most_mm, thin_mm]: [f32; 2]) -> f32 {
+        let mut most = 0.0f32;
+        for index in 0..self.ways.tools.len() {
+            if self.ways.may_lose[index] {
+                let body = &self.ways.tools[index].body;
+                let is_needle = body.pierces() && !body.has_point();
+                let kept = if is_needle { thin_mm } else { most_mm };
+                most = most.max(self.depth(index, state, part) / kept);
+            }
+        }
+        most
+    }
+
     /// How deep the tissue lies in one tool, mm, at part `part` of its way.
     pub fn depth(&mut self, index: usize, state: State<'_>, part: f32) -> f32 {
         let depth = self.deepest(index, state, part);

@@ -10,19 +10,19 @@ use crate::contact::{Compliance, ContactProblem, State};
 use crate::corrections::line_search::{DEAR_SHORTENINGS, LineSearch, SHORTENINGS, Tried};
 use crate::corrections::precondition::{DIAGONAL_WEIGHT, Env};
 use crate::corrections::solver::SMALLEST_DET;
-use crate::corrections::tool_contact::KEPT_MM;
 use crate::error::Result;
 use crate::memory;
 
 impl LocalSolver {
-    /// One iteration with the tools at part `way` of their way; tells whether it led to another state.
+    /// One iteration with the tools at part `way` of their way; tells whether it led to another state. `over` says how deep tissue and tools lie in each other there, over what an
+    /// iteration may leave.
     pub(in crate::corrections) fn improve(
         &mut self,
         step: &mut StepContext<'_>,
         problem: &mut ContactProblem,
         base: &[f32],
         way: f32,
-        sunk: impl Fn(&mut ContactProblem, &[f32]) -> f32,
+        over: impl Fn(&mut ContactProblem, &[f32]) -> f32,
     ) -> Result<bool> {
         let _span = tracing::trace_span!("iteration").entered();
         let env = step.context.env();
@@ -49,14 +49,14 @@ impl LocalSolver {
             let det = self.evaluate(step, t)?;
             // `d` is the direction until `accept` scales it: the slope is that of the line, not of the part.
             let slope_new = self.residuals.next.over(&self.d.step) - work;
-            let sunk_mm = match det > SMALLEST_DET {
-                true => sunk(problem, &self.residuals.trial),
+            let left = match det > SMALLEST_DET {
+                true => over(problem, &self.residuals.trial),
                 false => f32::MAX,
             };
             // An iteration may not lose the contact, unless it had been lost.
-            let is_kept = sunk_mm <= KEPT_MM || {
+            let is_kept = left <= 1.0 || {
                 self.place_at(base, 0.0);
-                sunk_mm <= sunk(problem, &self.residuals.trial)
+                left <= over(problem, &self.residuals.trial)
             };
             match search.judge(is_kept, slope_new) {
                 Tried::Accepted => {

@@ -2,7 +2,7 @@
 
 use crate::clock::Instant;
 
-use super::{Iterate, ToolStep, is_sound, is_spent, sunk};
+use super::{Iterate, ToolStep, is_sound, is_spent, over_kept};
 use crate::contact::ContactProblem;
 
 use crate::corrections::local::{Base, LocalSolver, StepContext};
@@ -180,8 +180,8 @@ impl ToolStep<'_> {
     pub(super) fn improve_at(&mut self, at: &mut Iterate<'_>, way: f32) -> Result<bool> {
         let input = self.input;
         let (local, mut step, problem) = self.local_solver()?;
-        let deep = |problem: &mut ContactProblem, u: &[f32]| sunk(input, problem, u, way);
-        let is_better = local.improve(&mut step, problem, at.u, way, deep)?;
+        let over = |problem: &mut ContactProblem, u: &[f32]| over_kept(input, problem, u, way);
+        let is_better = local.improve(&mut step, problem, at.u, way, over)?;
         if is_better {
             at.det = local.measured.det;
         }
