@@ -173,6 +173,42 @@ const tests = {
     assert.ok(scene.stats().step_count === 1 && scene.readings()[0].contact_count > 0);
   },
 
+  async loads_act_as_they_do_by_nodes() {
+    const upt = await start();
+    const model = await upt.open(bundle(LIVER));
+    const scenes = [model.scene(), model.scene()];
+    const node = model.indices("domainNodes")[0];
+    const rest = model.positions();
+    const place = [...rest.slice(3 * node, 3 * node + 3)];
+    const [point] = model.locate([place]);
+    const at = [0, 1, 2].map((axis) => point.nodes.reduce((sum, own, i) => sum + point.weights[i] * rest[3 * own + axis], 0));
+    at.forEach((x, axis) => assert.ok(Math.abs(x - place[axis]) < 1e-3));
+    const forces = new Float32Array(rest.length);
+    point.nodes.forEach((own, i) => (forces[3 * own + 2] = 40 * point.weights[i]));
+    const more = { gravity: [0, -1, 0], pressures: [{ pascal: 20 }, { pascal: -5, nodes: model.indices("domainNodes") }], support: { position: [0, 0, 1] } };
+    for (let step = 0; step < 4; step += 1) {
+      const one = scenes[0].step([], 0, { ...more, pointForces: [{ ...point, force: [0, 0, 40] }] }).slice();
+      assert.deepEqual(scenes[1].step([], 0, { ...more, forces }), one);
+      assert.ok(one[3 * node + 2] > 1e-3);
+    }
+    const scene = model.scene();
+    const ties = scene.bed({ centre: place, radius: 15, stiffness: 300, breakForce: 400 });
+    const ball = { shape: "sphere", radius: 5, position: [place[0], place[1], place[2] + 60] };
+    ties.forEach((tie) => Object.assign(tie, { to: "instrument", place: tie.place.map((x, axis) => x - ball.position[axis]) }));
+    assert.ok(ties.length > 3);
+    scene.step([ball], 0, { ties });
+    assert.ok(scene.tieReadings(ties.length).every((tie) => tie.broken === 0));
+    for (let step = 0; step < 20; step += 1) {
+      ball.position[2] += 0.5;
+      scene.step([ball], 0, { ties });
+    }
+    assert.ok(scene.tieReadings(ties.length).every((tie) => tie.broken === 1));
+    assert.equal(scene.present(0.01, [ball], { loads: { ties } }).length, rest.length);
+    assert.throws(() => scene.step([ball], 0, { ties: [{ ...ties[0], to: "moon" }] }), refused("UPT_ERR_ARGUMENT", /ties\[0\].to is moon/));
+    assert.throws(() => scene.step([ball], 0, { gravity: [NaN, 0, 0] }), refused("UPT_ERR_NON_FINITE", /gravity/));
+    assert.throws(() => model.locate([[1e4, 0, 0]]), refused("UPT_ERR_ARGUMENT", /outside the mesh/));
+  },
+
   async a_blade_cuts_and_what_is_new_of_the_surface_is_told() {
     const upt = await start();
     const model = await upt.open(bundle(LIVER));

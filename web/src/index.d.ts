@@ -47,9 +47,9 @@ export interface OpenOptions {
 
 /** The library, loaded. */
 export interface Upt {
-/** Its version. */
+  /** Its version. */
   readonly version: string;
-/** A bundle made ready to step. */
+  /** A bundle made ready to step. */
   open(source: BundleSource, options?: OpenOptions): Promise<Model>;
 }
 
@@ -58,23 +58,23 @@ export type IndexSet = "surfaceNodes" | "domainNodes" | "fixedNodes" | "surfaceF
 
 /** The fields of `upt_model_info`. */
 export interface ModelInfo {
-/** K, the nodes of the mesh. */
+  /** K, the nodes of the mesh. */
   node_count: number;
-/** Tetrahedra. */
+  /** Tetrahedra. */
   tet_count: number;
-/** Triangles of the boundary. */
+  /** Triangles of the boundary. */
   surface_face_count: number;
-/** Nodes that instruments may touch. */
+  /** Nodes that instruments may touch. */
   domain_node_count: number;
-/** Nodes held where they are. */
+  /** Nodes held where they are. */
   held_node_count: number;
   /** Length of a step, s. */
   dt: number;
   /** Longest push that it was made for, mm. */
   max_push_mm: number;
-/** Memory of the model. */
+  /** Memory of the model. */
   memory_bytes: number;
-/** Time to open it. */
+  /** Time to open it. */
   load_seconds: number;
   /** The length of a step that suits hosts that show frames, s. */
   frame_step_s: number;
@@ -95,11 +95,11 @@ export interface SceneOptions {
   errorLimitMm?: number;
   /** Damping of the tissue, 1/s; by default the bundle's. */
   dampingPerSecond?: number;
-/** The most substeps of a step that would miss the target, 1 for none, up to 8; by default the bundle's. */
+  /** The most substeps of a step that would miss the target, 1 for none, up to 8; by default the bundle's. */
   substeps?: number;
   /** What is done with a state that is no longer plausible. */
   guard?: "hold" | "report" | "blend";
-/** Tissue at rest is stepped too. */
+  /** Tissue at rest is stepped too. */
   neverSleeps?: boolean;
 }
 
@@ -109,7 +109,7 @@ export interface Instrument {
   position: ArrayLike<number> & Iterable<number>;
   /** Unit quaternion x, y, z, w. */
   rotation?: ArrayLike<number> & Iterable<number>;
-/** A capsule by default; along its local y. */
+  /** A capsule by default; along its local y. */
   shape?: "sphere" | "capsule" | "box" | "spatula";
   /** Of a ball or capsule, or a spatula's corners, mm. */
   radius?: number;
@@ -117,7 +117,7 @@ export interface Instrument {
   halfLength?: number;
   /** Half sizes of a box or spatula, mm. */
   halfExtents?: ArrayLike<number>;
-/** Slides by default; a grasp holds what was near when it began. */
+  /** Slides by default; a grasp holds what was near when it began. */
   mode?: "slide" | "grasp";
   /** Coulomb's coefficient. */
   friction?: number;
@@ -125,19 +125,111 @@ export interface Instrument {
   tearOff?: number;
 }
 
+/** A force at a point of the tissue; `Model.locate` finds the nodes. */
+export interface PointForce {
+  nodes: ArrayLike<number> & Iterable<number>;
+  /** 0 or more, with the sum 1. */
+  weights: ArrayLike<number> & Iterable<number>;
+  /** mN. */
+  force: ArrayLike<number>;
+}
+
+/** A spring from a point of the tissue to something else; its place in the list is its identity. */
+export interface Tie {
+  /** One node, or a point of a face: three. */
+  nodes: number[];
+  /** Of three nodes, with the sum 1. */
+  weights?: number[];
+  /** What it is tied to; the mesh's frame, which goes with the support, by default. */
+  to?: "support" | "world" | "instrument" | "tissue";
+  /** The far end, mm; of an instrument in its frame. */
+  place?: number[];
+  /** Its place among the step's instruments. */
+  instrument?: number;
+  /** The other point of the tissue. */
+  otherNodes?: number[];
+  otherWeights?: number[];
+  /** N/m. */
+  stiffness: number;
+  /** It pulls where it is longer than this, mm. */
+  slack?: number;
+  /** N s/m. */
+  damping?: number;
+  /** It breaks under more than this, mN; 0: never. */
+  breakForce?: number;
+  /** It pushes where it is shorter. */
+  pushes?: boolean;
+}
+
+/** Where a support is. */
+export interface Pose {
+  /** mm. */
+  position?: ArrayLike<number>;
+  /** Unit quaternion x, y, z, w. */
+  rotation?: ArrayLike<number>;
+}
+
+/** What acts on the tissue at the end of a step, beside instruments; in scenes with corrections. */
+export interface Loads {
+  /** m/s², in the mesh's frame; with a support in the world's. */
+  gravity?: ArrayLike<number>;
+  /** That under which the mesh was scanned: the difference acts. By default the bundle's. */
+  gravityAtRest?: ArrayLike<number>;
+  /** On the nodes [K,3], mN. */
+  forces?: ArrayLike<number>;
+  pointForces?: PointForce[];
+  /** From outside, Pa, on the boundary triangles with all corners among the nodes; without nodes on the domain. */
+  pressures?: { pascal: number; nodes?: ArrayLike<number> }[];
+  /** Every tie in every step, in the same order. */
+  ties?: Tie[];
+  /** Where what holds the body is, in every step where it moves. */
+  support?: Pose;
+  /** What support groups of the bundle do, in every step. */
+  supports?: (Pose & { group: number; letGo?: boolean; displacements?: ArrayLike<number> })[];
+}
+
+/** A region whose nodes are tied by one call; stiffness, damping and strength are those of all ties together. */
+export interface BedOptions {
+  /** mm. */
+  centre?: ArrayLike<number>;
+  radius?: number;
+  /** The region as nodes instead. */
+  nodes?: ArrayLike<number>;
+  /** N/m. */
+  stiffness: number;
+  /** mN; 0: none breaks. */
+  breakForce?: number;
+  /** N s/m. */
+  damping?: number;
+  /** Of each tie, mm. */
+  slack?: number;
+  /** From each node to where it is tied, mm. */
+  offset?: ArrayLike<number>;
+}
+
+/** The fields of `upt_tie_reading`. */
+export interface TieReading {
+  /** 1 where it holds no more, and where it broke in this step. */
+  broken: number;
+  broke: number;
+  /** On the tissue, mN. */
+  force: [number, number, number];
+  length_mm: number;
+}
+
 /** The fields of `upt_instrument_reading`. */
 export interface Reading {
-/** Points of the tissue that push or hold it. */
+  /** Points of the tissue that push or hold it. */
   contact_count: number;
   /** On the instrument, mN. */
   force: [number, number, number];
   /** About its position, mN mm. */
   torque: [number, number, number];
-/** How deep tissue lies inside of it, mm. */
+  /** How deep tissue lies inside of it, mm. */
   penetration_mm: number;
-/** 1 where its grasp tore off in this step. */
+  /** 1 where its grasp tore off in this step. */
   torn: number;
-/** What is left of the contact problem, mm. */
+  /** What is left of the contact problem, mm. */
   residual_mm: number;
 }
 
@@ -145,30 +237,30 @@ export interface Reading {
 export interface Stats {
   /** UPT_FLAG_*. */
   flags: number;
-/** Steps since creation or reset. */
+  /** Steps since creation or reset. */
   step_count: number;
-/** Largest displacement, mm. */
+  /** Largest displacement, mm. */
   max_displacement_mm: number;
-/** Corrections that the last step made. */
+  /** Corrections that the last step made. */
   corrections: number;
-/** Its estimated error, mm; 0 without corrections. */
+  /** Its estimated error, mm; 0 without corrections. */
   error_mm: number;
-/** Above 1: outside of what the model was made for. */
+  /** Above 1: outside of what the model was made for. */
   indicator: number;
-/** 1 where the tissue is at rest and steps cost nothing. */
+  /** 1 where the tissue is at rest and steps cost nothing. */
   sleeping: number;
   [field: string]: number;
 }
 
 /** The fields of `upt_scene_timing`: what the last step and its stages took, ms. */
 export interface Timing {
-/** Steps since creation or reset, the last of which this is of. */
+  /** Steps since creation or reset, the last of which this is of. */
   step_count: number;
-/** The whole step. */
+  /** The whole step. */
   step_ms: number;
-/** Corrections. */
+  /** Corrections. */
   corrections_ms: number;
-/** Contact with instruments, a part of the corrections. */
+  /** Contact with instruments, a part of the corrections. */
   contact_ms: number;
   [field: string]: number;
 }
@@ -177,15 +269,17 @@ export interface Timing {
 export interface Model {
   /** For the C ABI. */
   readonly handle: number;
-/** Counts and the length of a step. */
+  /** Counts and the length of a step. */
   readonly info: ModelInfo;
   /** Name, hash and more. */
   describe(): { name: string; bundle_sha256: string; instruction_set: string; [field: string]: unknown };
   /** At rest [K,3], mm. */
   positions(): Float32Array;
-/** Nodes, three for each face, or four for each tetrahedron. */
+  /** Nodes, three for each face, or four for each tetrahedron. */
   indices(set: IndexSet): Uint32Array;
-/** A tissue at rest. */
+  /** The points of the mesh at places at rest [n, 3], mm. */
+  locate(places: number[][]): { nodes: number[]; weights: number[] }[];
+  /** A tissue at rest. */
   scene(options?: SceneOptions): Scene;
   /** Its scenes stay usable. */
   close(): void;
@@ -195,15 +289,15 @@ export interface Model {
 export interface Cut {
   /** 1 where the body is another one: its surface wants an update. */
   is_changed: number;
-/** Nodes of the body now. */
+  /** Nodes of the body now. */
   node_count: number;
-/** Nodes that the operation has added. */
+  /** Nodes that the operation has added. */
   copied_count: number;
   /** New area, mm². */
   area_mm2: number;
   /** What the body has lost, mm³. */
   removed_mm3: number;
-/** Pieces that nothing holds. */
+  /** Pieces that nothing holds. */
   fragment_count: number;
   /** On the blade, mN. */
   force: [number, number, number];
@@ -219,7 +313,7 @@ export interface CutOptions {
   fractureEnergy?: number;
   /** With how much the blade must be pushed before it cuts, mN. */
   threshold?: number;
-/** How much it is pushed, mN. */
+  /** How much it is pushed, mN. */
   pushed?: number;
   /** Where the edge is sharp; zeros: everywhere. */
   ahead?: ArrayLike<number>;
@@ -227,7 +321,7 @@ export interface CutOptions {
 
 /** The closed surface of a body. Vertices and slots of triangles keep their numbers. */
 export interface Surface {
-/** All of it: the first surface, and after another body was put back. */
+  /** All of it: the first surface, and after another body was put back. */
   isNew: boolean;
   /** The first vertex that is new. */
   firstVertex: number;
@@ -246,22 +340,26 @@ export interface Scene {
   /** For the C ABI. */
   readonly handle: number;
   /** Displacements [n,3] of the region after a step with the instruments where they are at its end, mm. */
-  step(instruments?: Instrument[], timeSeconds?: number): Float32Array;
+  step(instruments?: Instrument[], timeSeconds?: number, loads?: Loads): Float32Array;
+  /** The ties of a bed, from where its nodes are in the last state. */
+  bed(options: BedOptions): Tie[];
+  /** Of the last step's ties, in their order. */
+  tieReadings(count: number): TieReading[];
   /** The tissue `when` seconds after the last step, with the instruments there: of the region, of the attached points, or of the surface's vertices. */
-  present(when: number, instruments?: Instrument[], options?: { points?: boolean; surface?: boolean }): Float32Array;
-/** The last published state, as `step` gives it. */
+  present(when: number, instruments?: Instrument[], options?: { points?: boolean; surface?: boolean; loads?: Loads }): Float32Array;
+  /** The last published state, as `step` gives it. */
   read(): Float32Array;
   /** Of the last step's instruments, in their order. */
   readings(): Reading[];
-/** What the last step was. */
+  /** What the last step was. */
   stats(): Stats;
-/** What it took. */
+  /** What it took. */
   timing(): Timing;
   /** The nodes that are shown from here on; none means all. */
   setRegion(nodes?: ArrayLike<number> & Iterable<number>): void;
   /** Points [p,3] at rest, mm. */
   attachPoints(points: ArrayLike<number> & Iterable<number>): void;
-/** Displacements [p,3] of the attached points in the last state, mm. */
+  /** Displacements [p,3] of the attached points in the last state, mm. */
   readPoints(): Float32Array;
   /** Of the body: copies that cuts have made included. */
   readonly nodeCount: number;
@@ -275,18 +373,18 @@ export interface Scene {
   scaleStiffness(elements: ArrayLike<number> & Iterable<number>, factor: number): Cut;
   /** Takes the pieces that nothing holds out of the body. */
   dropFragments(): Cut;
-/** The surface of the body as it is now, and what has changed since the last call. */
+  /** The surface of the body as it is now, and what has changed since the last call. */
   updateSurface(): Surface;
   /** State and body. */
   save(): Uint8Array;
-/** Back to what `save` gave, to the bit. */
+  /** Back to what `save` gave, to the bit. */
   restore(snapshot: Uint8Array): void;
   /** Begins to record what the scene is given, for `upt replay --verify`, with a hash after every so many steps (1); 0 ends it. */
   record(every?: number): void;
   /** The lines of the recording that were not taken before; together they make the file. */
   takeRecord(): string;
-/** Back to rest, with the intact body. */
+  /** Back to rest, with the intact body. */
   reset(): void;
-/** Frees it. */
+  /** Frees it. */
   close(): void;
 }

@@ -2,12 +2,12 @@
 import * as abi from "./abi.js";
 import { files } from "./files.js";
 import { get } from "./get.js";
+import { choice, instrumentFields } from "./instruments.js";
+import { bed, located, tieReadings, withLoads } from "./loads.js";
 import { Module, UptError } from "./module.js";
 export { forgetBundles } from "./store.js";
 export { UptError };
 
-const MODES = { slide: abi.UPT_MODE_SLIDE, grasp: abi.UPT_MODE_GRASP };
-const SHAPES = { sphere: abi.UPT_SHAPE_SPHERE, capsule: abi.UPT_SHAPE_CAPSULE, box: abi.UPT_SHAPE_BOX, spatula: abi.UPT_SHAPE_SPATULA };
 const SETS = {
   surfaceNodes: abi.UPT_SET_SURFACE_NODES,
   domainNodes: abi.UPT_SET_DOMAIN_NODES,
@@ -18,11 +18,6 @@ const SETS = {
 };
 const CORRECTIONS = { recommended: abi.UPT_CORRECTIONS_RECOMMENDED, none: abi.UPT_CORRECTIONS_NONE, auto: abi.UPT_CORRECTIONS_AUTO };
 const GUARDS = { hold: abi.UPT_GUARD_HOLD, report: abi.UPT_GUARD_REPORT, blend: abi.UPT_GUARD_BLEND };
-
-function choice(names, name, what) {
-  if (!(name in names)) throw new UptError("UPT_ERR_ARGUMENT", `${what} is ${name}; it can be ${Object.keys(names).join(", ")}`);
-  return names[name];
-}
 
 /** Loads the library. Each call makes an instance with a memory of its own. */
 export async function load({ wasm = get(new URL("./upt.wasm", import.meta.url)), isa } = {}) {
@@ -97,6 +92,11 @@ class Model {
     });
   }
 
+  /** The points of the mesh at places at rest [n, 3], mm: four nodes and their weights each, for `pointForces`. */
+  locate(places) {
+    return located(this.#module, this.handle, places);
+  }
+
   /** A scene at rest. */
   scene(options) {
     return new Scene(this.#module, this.handle, this.info.node_count, options);
@@ -146,20 +146,30 @@ class Scene {
     this.#room = { at: module.alloc(12 * nodes), floats: 3 * nodes };
   }
 
-  /** A step that instruments drive: displacements [n,3] of the region, a view of the module's memory until the next call. */
-  step(instruments = [], timeS = 0) {
-    const input = this.#write(instruments, timeS);
-    return this.#filled(this.#shown, (at, floats) => this.#module.run("upt_scene_step", this.handle, input, at, floats));
+  /** A step that instruments drive, and loads beside them: displacements [n,3] of the region, a view of the module's memory until the next call. */
+  step(instruments = [], timeS = 0, loads = undefined) {
+    return this.#driven(this.#shown, { instruments, timeS, loads }, (...given) => this.#module.run("upt_scene_step", this.handle, ...given));
+  }
+
+  /** The ties of a bed, to be passed in every step. */
+  bed(options) {
+    return bed(this.#module, this.handle, options);
+  }
+
+  /** What each of `count` ties of the last step does: the fields of `upt_tie_reading`. */
+  tieReadings(count) {
+    return tieReadings(this.#module, this.handle, count);
   }
 
   /** The tissue `when` seconds after the last step, with the instruments there; as `step`, or of the attached points, or of the surface's vertices. */
-  present(when, instruments = [], { points = false, surface = false } = {}) {
-    const input = this.#write(instruments, 0);
+  present(when, instruments = [], { points = false, surface = false, loads = undefined } = {}) {
     const view = this.#input + abi.upt_input.size;
     const kind = points ? abi.UPT_VIEW_POINTS : surface ? abi.UPT_VIEW_SURFACE : abi.UPT_VIEW_REGION;
+    this.#refuseIfClosed();
     this.#module.write(view, abi.upt_view, { kind });
     const count = points ? this.#points : surface ? this.#vertices : this.#shown;
-    return this.#filled(count, (at, floats) => this.#module.run("upt_scene_present", this.handle, input, when, view, at, floats));
+    const show = (input, ...out) => this.#module.run("upt_scene_present", this.handle, input, when, view, ...out);
+    return this.#driven(count, { instruments, timeS: 0, loads }, show);
   }
 
   /** Displacements of the region in the last state. */
@@ -335,6 +345,14 @@ class Scene {
     if (this.#closed) this.reset();
   }
 
+  // Calls with an input and room for `count` vectors, and looks at it.
+  #driven(count, { instruments, timeS, loads }, call) {
+    return withLoads(this.#module, loads, (fields) => {
+      const input = this.#write(instruments, timeS, fields);
+      return this.#filled(count, (at, floats) => call(input, at, floats));
+    });
+  }
+
   // Calls with room for `count` vectors, and looks at it.
   #filled(count, call) {
     this.#refuseIfClosed();
@@ -357,7 +375,7 @@ class Scene {
     });
   }
 
-  #write(instruments, timeS) {
+  #write(instruments, timeS, loads = {}) {
     this.#refuseIfClosed();
     const { size } = abi.upt_instrument;
     const needed = size * instruments.length;
@@ -366,20 +384,9 @@ class Scene {
       this.#tools = { at: this.#module.alloc(needed), room: needed };
     }
     this.#tools.count = instruments.length;
-    instruments.forEach((tool, i) => {
-      const { shape = "capsule", mode = "slide", halfLength = 0 } = tool;
-      this.#module.write(this.#tools.at + size * i, abi.upt_instrument, {
-        shape: choice(SHAPES, shape, `instruments[${i}].shape`),
-        position: tool.position,
-        rotation: tool.rotation ?? [0, 0, 0, 1],
-        half_extents: tool.halfExtents ?? [0, halfLength, 0],
-        radius: tool.radius ?? 0,
-        mode: choice(MODES, mode, `instruments[${i}].mode`),
-        friction: tool.friction ?? 0,
-        tear_off_mn: tool.tearOff ?? 0,
-      });
-    });
+    instruments.forEach((tool, i) => this.#module.write(this.#tools.at + size * i, abi.upt_instrument, instrumentFields(tool, i)));
     this.#module.write(this.#input, abi.upt_input, {
+      ...loads,
       instruments: needed ? this.#tools.at : 0,
       instrument_count: instruments.length,
       time_s: timeS,
