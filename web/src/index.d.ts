@@ -127,6 +127,7 @@ export interface Instrument {
 
 /** A force at a point of the tissue; `Model.locate` finds the nodes. */
 export interface PointForce {
+  /** Four nodes around the point. */
   nodes: ArrayLike<number> & Iterable<number>;
   /** 0 or more, with the sum 1. */
   weights: ArrayLike<number> & Iterable<number>;
@@ -148,6 +149,7 @@ export interface Tie {
   instrument?: number;
   /** The other point of the tissue. */
   otherNodes?: number[];
+  /** Its weights, as those of `nodes`. */
   otherWeights?: number[];
   /** N/m. */
   stiffness: number;
@@ -177,6 +179,7 @@ export interface Loads {
   gravityAtRest?: ArrayLike<number>;
   /** On the nodes [K,3], mN. */
   forces?: ArrayLike<number>;
+  /** At points of the tissue, at most 256. */
   pointForces?: PointForce[];
   /** From outside, Pa, on the boundary triangles with all corners among the nodes; without nodes on the domain. */
   pressures?: { pascal: number; nodes?: ArrayLike<number> }[];
@@ -190,8 +193,9 @@ export interface Loads {
 
 /** A region whose nodes are tied by one call; stiffness, damping and strength are those of all ties together. */
 export interface BedOptions {
-  /** mm. */
+  /** Of the region, mm. */
   centre?: ArrayLike<number>;
+  /** Of the region, mm. */
   radius?: number;
   /** The region as nodes instead. */
   nodes?: ArrayLike<number>;
@@ -209,11 +213,13 @@ export interface BedOptions {
 
 /** The fields of `upt_tie_reading`. */
 export interface TieReading {
-  /** 1 where it holds no more, and where it broke in this step. */
+  /** 1 where it holds no more. */
   broken: number;
+  /** 1 where it broke in this step. */
   broke: number;
   /** On the tissue, mN. */
   force: [number, number, number];
+  /** Between its ends. */
   length_mm: number;
 }
 
