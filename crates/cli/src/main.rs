@@ -97,7 +97,7 @@ enum Command {
     Modes(left_out::Options),
     /// List the schemes and the programmes of tools, with the ranges that their cases are drawn from.
     Loads(loads::Options),
-    /// Fit a law to measured curves of tension, compression and shear.
+    /// Fit a law to measured curves of tension, compression, shear and torsion.
     Fit(fit::Options),
     /// Hold laws and solver against measured tissue and closed forms.
     #[cfg(feature = "linear")]

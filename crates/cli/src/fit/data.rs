@@ -1,6 +1,6 @@
 //! A test's file: CSV with a head line. `docs/reference/formats.md`, "Tests of a material", describes it.
 //!
-//! Columns by name, in any order: `mode` (tension, compression or shear); `stretch` or `stretch_or_shear` or, for shear alone, `shear` (the
+//! Columns by name, in any order: `mode` (tension, compression, shear or torsion); `stretch` or `stretch_or_shear` or, for shear alone, `shear` (the
 //! stretch is 1 at rest, the amount of shear 0); `nominal_stress_pa` or `nominal_stress_kpa` (force over the area at rest, negative
 //! under compression); and if a file holds several specimens, their name in `sample`, `region` or `phantom`.
 
@@ -127,7 +127,7 @@ pub fn read(path: &Path) -> Result<Vec<Sample>> {
             table.number(row, stretch)?,
             table.number(row, stress)? * unit,
         );
-        if mode != Mode::Shear && x <= 0.0 {
+        if !mode.is_shear() && x <= 0.0 {
             bail!(
                 "{}: a stretch of {x} in {}; it is length over length at rest, above 0",
                 path.display(),

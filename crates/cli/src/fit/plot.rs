@@ -1,8 +1,6 @@
 //! The picture of a fit: measured points, and the law's curve through them.
 
-use elements::Ogden;
-
-use super::curve::{Curve, Mode, nominal_stress};
+use super::curve::{Curve, Mode, Response, nominal_stress};
 use super::hold::{Hold, Terms};
 use picture::plot::{Axes, Scale, colour};
 
@@ -11,11 +9,11 @@ const STEPS: usize = 120;
 
 /// Strain or amount of shear of a stretch.
 fn strain(mode: Mode, x: f64) -> f64 {
-    if mode == Mode::Shear { x } else { x - 1.0 }
+    if mode.is_shear() { x } else { x - 1.0 }
 }
 
 /// An SVG file: stress in kPa over strain or shear, discs measured, lines of each law, the first one solid.
-pub fn draw(curves: &[Curve], laws: &[(&str, &Ogden)]) -> String {
+pub fn draw(curves: &[Curve], laws: &[(&str, &impl Response)]) -> String {
     let range = |values: &mut dyn Iterator<Item = f64>| {
         values.fold([0.0f64, 0.0], |[low, high], v| [low.min(v), high.max(v)])
     };
@@ -44,7 +42,7 @@ pub fn draw(curves: &[Curve], laws: &[(&str, &Ogden)]) -> String {
                 .map(|x| {
                     (
                         strain(curve.mode, x),
-                        1e-3 * nominal_stress(law, curve.mode, x),
+                        1e-3 * nominal_stress(*law, curve.mode, x),
                     )
                 })
                 .filter(|(_, y)| (low..=high).contains(y))
