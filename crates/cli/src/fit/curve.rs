@@ -12,7 +12,7 @@ use anyhow::{Result, bail};
 use elements::{Deformation, Law, Moduli, Ogden, stress, vector};
 
 /// Intervals of Simpson's rule over the radius of a cylinder.
-const RINGS: usize = 24;
+const RINGS: usize = 32;
 
 /// How a specimen was loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

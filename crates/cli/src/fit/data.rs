@@ -196,7 +196,7 @@ mod tests {
             (format!("{head}{rows}tension,1.2\n"), "line 4 has 2 fields"),
             (format!("{head}{rows}tension,1.2,x\n"), "stress_pa is `x`"),
             (format!("{head}{rows}tension,1.2,inf\n"), "stress_pa is inf"),
-            (format!("{head}{rows}torsion,1.2,1\n"), "mode `torsion`"),
+            (format!("{head}{rows}bending,1.2,1\n"), "mode `bending`"),
             (format!("{head}{rows}tension,0,1\n"), "stretch of 0"),
             (
                 format!("{head}compression,0.9,2\ncompression,0.8,3\ncompression,0.7,4\n"),

@@ -82,13 +82,13 @@ fn bound(low: f64, up: f64) -> MPPar {
 /// The best law of all starts.
 pub fn best(curves: &[Curve], which: Growing) -> Result<Scaled> {
     let unit = curves.iter().map(Curve::largest).fold(0.0, f64::max);
-    let free = bound(0.0, f64::INFINITY);
-    let (bounds, starts) = match which {
-        Growing::Yeoh(count) => (vec![free; count], vec![vec![1.0; count]]),
-        Growing::VerondaWestmann => (
-            vec![free, bound(BETAS[0], BETAS[1])],
-            STARTS.map(|beta| vec![1.0, beta]).into(),
-        ),
+    let starts = match which {
+        Growing::Yeoh(count) => vec![vec![1.0; count]],
+        Growing::VerondaWestmann => STARTS.map(|beta| vec![1.0, beta]).into(),
+    };
+    let bound_of = |at: usize| match which {
+        Growing::VerondaWestmann if at == 1 => bound(BETAS[0], BETAS[1]),
+        _ => bound(0.0, f64::INFINITY),
     };
     let mut best: Option<(f64, Scaled)> = None;
     for mut unknown in starts {
@@ -96,7 +96,7 @@ pub fn best(curves: &[Curve], which: Growing) -> Result<Scaled> {
             which,
             curves,
             unit,
-            bounds: bounds.clone(),
+            bounds: (0..unknown.len()).map(bound_of).collect(),
         };
         // A start that leads nowhere is left to the others.
         let Ok(status) = problem.mpfit(&mut unknown) else {
