@@ -37,7 +37,7 @@ use crate::error::Result;
 pub(super) const SUNK_MM: f32 = 0.9;
 /// An iteration may leave it so deep, mm.
 const KEPT_MM: f32 = 0.5 * SUNK_MM;
-/// The same of a needle, whose tip slides to other tissue.
+/// A needle, whose tip slides to other tissue, may be left so deep, mm.
 const KEPT_THIN_MM: f32 = 0.35 * SUNK_MM;
 /// Tools that go less far in a step are followed in one part from the last state, mm.
 const LEAST_WAY_MM: f32 = 0.3;
