@@ -46,6 +46,11 @@ class Files(SimpleHTTPRequestHandler):
             Files.may_end.wait(60)
             self.close_connection = True
 
+    def end_headers(self) -> None:
+        # What is asked for is the page's choice, not that of the browser's cache, which keeps files by their age.
+        self.send_header("Cache-Control", "no-store")
+        super().end_headers()
+
     def copyfile(self, source, outputfile) -> None:
         Files.sent += os.fstat(source.fileno()).st_size
         super().copyfile(source, outputfile)
