@@ -120,13 +120,16 @@ namespace Upt.Interop
             {
                 handle.DangerousRelease();
             }
-            for (int i = 0; i < count; i++)
+            fixed (upt_point_force* found = forces)
             {
-                forces[i].struct_size = (uint)sizeof(upt_point_force);
-                for (int k = 0; k < 4; k++)
+                for (int i = 0; i < count; i++)
                 {
-                    forces[i].nodes[k] = nodes[4 * i + k];
-                    forces[i].weights[k] = weights[4 * i + k];
+                    found[i].struct_size = (uint)sizeof(upt_point_force);
+                    for (int k = 0; k < 4; k++)
+                    {
+                        found[i].nodes[k] = nodes[4 * i + k];
+                        found[i].weights[k] = weights[4 * i + k];
+                    }
                 }
             }
             return forces;
