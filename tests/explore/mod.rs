@@ -1,7 +1,7 @@
 //! Random cases for the fuzz tests, by the clock: rounds of a fixed size, each from a seed of its own, until the time is
 //! over. What a round does follows from its seed alone.
 //!
-//! `UPT_FUZZ_SECONDS` (60) is the time of the longest test, others take a share of it; a least number of rounds always
+//! `UPT_FUZZ_SECONDS` (20) is the time of the longest test, others take a share of it; a least number of rounds always
 //! runs. `UPT_FUZZ_SEED` (0) is the first round's seed, the next ones follow it.
 
 use std::io::Write;
@@ -34,7 +34,7 @@ pub struct Budget {
 /// seeds; a failure names its seed and the smallest value that fails.
 pub fn explore<S: Strategy>(what: &str, budget: Budget, strategy: &S, test: impl Fn(S::Value)) {
     let start = Instant::now();
-    let time = Duration::from_secs_f64(number("UPT_FUZZ_SECONDS", 60) as f64 * budget.share);
+    let time = Duration::from_secs_f64(number("UPT_FUZZ_SECONDS", 20) as f64 * budget.share);
     let first = number("UPT_FUZZ_SEED", 0);
     for seed in first.. {
         let mut bytes = [0; 32];
