@@ -7,18 +7,20 @@ source tests/cross/count.sh
 
 lint() { check "clippy $*" cargo clippy --release --all-targets "$@" -- -D warnings; }
 
-# alone PACKAGE FEATURE...: one build for each; "" is none.
+# alone PACKAGES FEATURES: those packages with nothing but these features. What is checked together shares its dependencies, which differ in
+# their features from one build to the next and are most of the work.
 alone() {
-  local package="$1" feature
-  shift
-  for feature in "$@"; do lint --package "$package" --no-default-features --features="$feature"; done
+  local package packages=()
+  for package in $1; do packages+=(--package "$package"); done
+  lint "${packages[@]}" --no-default-features --features="$2"
 }
 
 lint --workspace
-alone libupt "" instruments learned
-alone tissue "" files linear
-alone upt-cli "" # the demo's
-alone upt-study ""
+alone "libupt tissue" ""
+alone "libupt tissue" libupt/instruments
+alone "libupt tissue" libupt/learned,tissue/linear
+alone tissue files
+alone "upt-cli upt-study" "" # the demo's
 if compgen -G "$(rustc --print target-libdir --target wasm32-unknown-unknown)/libstd-*" >/dev/null; then
   check "clippy for WebAssembly" cargo clippy --release --package libupt --lib --target wasm32-unknown-unknown --no-default-features \
     --features instruments -- -D warnings
