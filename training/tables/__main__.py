@@ -51,7 +51,10 @@ def parser(tables: dict[str, ModuleType]) -> argparse.ArgumentParser:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    tables = {name: import_module(name) for name in TABLES}
+    # Most import torch, which takes seconds: help and wrong names need all, a table none but its own.
+    asked = (sys.argv[1:] if arguments is None else arguments)[:1]
+    tables = {name: import_module(name) for name in asked if name in TABLES}
+    tables = tables or {name: import_module(name) for name in TABLES}
     options = parser(tables).parse_args(arguments)
     table = tables[options.table]
     marks = options.marks or (table.marks(options) if hasattr(table, "marks") else table.MARKS)

@@ -81,10 +81,12 @@ impl Workspace {
         self.release.join(name)
     }
 
-    /// `program` in the repository's root with these arguments, which spaces part.
+    /// `program` in the repository's root with these arguments, which spaces part. Python keeps what it compiled, whatever the environment says:
+    /// the tests start it some hundred times, and compiling torch is most of an import.
     pub fn command(&self, program: impl AsRef<std::ffi::OsStr>, arguments: &str) -> Command {
         let mut command = Command::new(program);
         command.current_dir(&self.root);
+        command.env_remove("PYTHONDONTWRITEBYTECODE");
         command.args(arguments.split_whitespace());
         command
     }
