@@ -365,6 +365,26 @@ const tests = {
     assert.deepEqual(between(tool(0), tool(100), 0.5), tool(100), "put, not moved");
     assert.ok(Math.abs(between([{ ...tool(0)[0], rotation: [0, 0, 0, -1] }], tool(2), 0.5)[0].rotation[3]) > 0.999);
   },
+
+  async a_grasp_closes_where_it_has_come_to_and_holds_when_time_is_lost() {
+    const tool = (x, mode) => [{ position: [x, 0, 0], mode }];
+    const clock = new Clock(0.02);
+    clock.moved(0, tool(0, "slide"));
+    assert.equal(clock.step(0)[0].mode, "slide");
+    clock.moved(0.06, tool(6, "grasp"));
+    const closing = [1, 2, 3].map(() => clock.step(0.06)[0]);
+    assert.deepEqual(closing.map(({ mode }) => mode), ["slide", "slide", "grasp"]);
+    // A page that shows a picture a second: the tool is where the tissue can follow.
+    clock.moved(1, tool(36, "grasp"));
+    assert.ok(Math.abs(clock.step(1)[0].position[0] - 11) < 1e-9);
+    clock.moved(2, tool(36, "grasp"));
+    assert.ok(Math.abs(clock.step(2)[0].position[0] - 16) < 1e-9);
+    clock.moved(2.01, tool(200, "grasp"));
+    clock.moved(2.02, tool(201, "grasp"));
+    assert.equal(clock.step(2.02)[0].position[0], 201, "put, not moved");
+    clock.moved(3, tool(210, "slide"));
+    assert.equal(clock.step(3)[0].position[0], 210, "what holds nothing is at once where it is");
+  },
 };
 
 function rollouts() {

@@ -75,11 +75,10 @@ def a_grasp_pulls(browser: Browser, address: str, name: str) -> None:
     browser.click("#grasp")
     browser.drag([(x, y)], release=False)
     browser.wait("uptView.largest > 2 && uptView.contacts > 0")
-    # A tool that goes far in a step has been put there, and lets go: on a slow machine all of these moves would be one.
-    for i in range(1, 7):
-        browser.move([(x + 5 * i, y - 10 * i)])
-        steps = browser.run("return uptView.steps")
-        browser.wait(f"uptView.steps > {steps + 1}")
+    # It closes once it is at its depth, whenever the page comes to that; what moves before only slides.
+    steps = browser.wait("uptView.grasp && uptView.steps")
+    browser.wait(f"uptView.steps > {steps + 2}")
+    browser.move([(x + 5 * i, y - 10 * i) for i in range(1, 7)])
     browser.wait("uptView.largest > 8 && uptView.contacts > 0")
     browser.screenshot(str(PICTURES / f"{name}-grasped.png"))
     browser.release()

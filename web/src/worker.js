@@ -36,7 +36,7 @@ export class Tissue {
 
   /**
    * The tissue of this moment, with the instruments where they are now. Steps are made between frames, at the clock's pace, with the
-   * instruments where they were at each step's moment. One whose `kind` is "blade", "aspirator" or "coagulator" changes the body in place of touching it.
+   * instruments where they were at each step's moment, but that one which holds tissue goes 5 mm a step at most. One whose `kind` is "blade", "aspirator" or "coagulator" changes the body in place of touching it.
    */
   frame(instruments = []) {
     return this.#ask("frame", instruments);

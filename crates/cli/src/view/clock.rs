@@ -13,6 +13,9 @@ use super::protocol::Tool;
 const MOST_POSES: usize = 256;
 /// What was lost for longer is not made up for, s.
 const LOST_S: f64 = 0.1;
+/// A step's way of a tool that holds tissue, mm and radians: what is lost on a slow machine must not tear it off.
+const HELD_MM: f32 = 5.0;
+const HELD_RAD: f32 = 0.1;
 
 /// Times in seconds, from any beginning.
 pub struct Clock {
@@ -24,6 +27,10 @@ pub struct Clock {
     started: bool,
     in_flight: bool,
     poses: VecDeque<(f64, Option<Tool>)>,
+    /// The tool of the last step.
+    last: Option<Tool>,
+    /// When the tool was put elsewhere last.
+    put: f64,
 }
 
 impl Clock {
@@ -36,6 +43,8 @@ impl Clock {
             started: false,
             in_flight: false,
             poses: VecDeque::new(),
+            last: None,
+            put: f64::NEG_INFINITY,
         }
     }
 
@@ -44,6 +53,11 @@ impl Clock {
         if !self.started {
             self.started = true;
             (self.next, self.published) = (now, now);
+        }
+        if let (Some(&(when, Some(from))), Some(to)) = (self.poses.back(), &tool)
+            && is_put(&from, to)
+        {
+            self.put = when;
         }
         if self.poses.len() == MOST_POSES {
             self.poses.pop_front();
@@ -61,10 +75,16 @@ impl Clock {
         if now - self.next > (2.0 * self.dt).max(LOST_S) {
             self.next = now;
         }
-        self.step = self.next;
+        let before = std::mem::replace(&mut self.step, self.next);
         self.next += self.dt;
         self.in_flight = true;
-        self.place(self.step)
+        let wanted = self.place(self.step);
+        let was_put = before <= self.put && self.put < self.step;
+        self.last = match was_put {
+            true => wanted,
+            false => followed(self.last, wanted),
+        };
+        self.last
     }
 
     /// The moment of the step that has begun.
@@ -106,18 +126,43 @@ impl Clock {
     }
 }
 
-/// The tool on its way from one place to another.
+/// The tool on its way from one place to another. One that closes or opens there does so when it has come.
 pub fn between(from: Option<Tool>, to: Option<Tool>, part: f32) -> Option<Tool> {
-    let (Some(from), Some(mut at)) = (from, to) else {
+    let (Some(start), Some(end)) = (from, to) else {
         return to;
     };
-    if from.kind != at.kind {
+    if start.kind != end.kind || part >= 1.0 || is_put(&start, &end) {
         return to;
     }
-    let far = |k: usize| (at.position[k] - from.position[k]).abs() > PUT_MM;
-    if part >= 1.0 || (0..3).any(far) {
-        return to;
+    Some(on(start, end, part))
+}
+
+fn is_put(from: &Tool, to: &Tool) -> bool {
+    (0..3).any(|k| (to.position[k] - from.position[k]).abs() > PUT_MM)
+}
+
+/// The tool in the step after another: one that holds tissue goes no farther than the tissue can follow.
+fn followed(last: Option<Tool>, wanted: Option<Tool>) -> Option<Tool> {
+    let (Some(start), Some(end)) = (last, wanted) else {
+        return wanted;
+    };
+    let ways = (0..3).map(|k| (end.position[k] - start.position[k]).powi(2));
+    let way = ways.sum::<f32>().sqrt();
+    let dot: f32 = (0..4).map(|k| start.rotation[k] * end.rotation[k]).sum();
+    let turn = 2.0 * dot.abs().min(1.0).acos();
+    let part = (HELD_MM / way).min(HELD_RAD / turn);
+    match start.grasp && end.grasp && part < 1.0 {
+        true => Some(on(start, end, part)),
+        false => wanted,
     }
+}
+
+/// The tool at a part of its way.
+fn on(from: Tool, to: Tool, part: f32) -> Tool {
+    let mut at = Tool {
+        grasp: from.grasp,
+        ..to
+    };
     let dot: f32 = (0..4).map(|k| from.rotation[k] * at.rotation[k]).sum();
     let sign = if dot < 0.0 { -1.0 } else { 1.0 };
     for (end, start) in at.rotation.iter_mut().zip(from.rotation) {
@@ -129,7 +174,7 @@ pub fn between(from: Option<Tool>, to: Option<Tool>, part: f32) -> Option<Tool> 
     for (end, start) in at.position.iter_mut().zip(from.position) {
         *end = start + part * (*end - start);
     }
-    Some(at)
+    at
 }
 
 #[cfg(test)]
@@ -209,5 +254,27 @@ mod tests {
         turned.rotation = [0.0, 0.0, 0.0, -1.0]; // the same rotation
         let half = between(tool(0.0), Some(turned), 0.5).unwrap();
         assert!((half.rotation[3].abs() - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_grasp_closes_where_it_has_come_to_and_holds_when_time_is_lost() {
+        let tool = |x, grasp| tool(x).map(|tool| Tool { grasp, ..tool });
+        let mut clock = Clock::new(0.02);
+        let mut step = |now, at| {
+            clock.moved(now, at);
+            let tool = clock.begin(now).unwrap();
+            clock.finished();
+            (tool.position[0], tool.grasp)
+        };
+        assert_eq!(step(0.0, tool(0.0, false)), (0.0, false));
+        assert!(!step(0.03, tool(3.0, true)).1, "on its way");
+        assert!(step(0.05, tool(5.0, true)).1);
+        // A page that shows a picture a second: the tool is where the tissue can follow.
+        let (begun, _) = step(1.0, tool(35.0, true));
+        let (next, holds) = step(2.0, tool(35.0, true));
+        assert!(holds && (next - begun - 5.0).abs() < 1e-4, "{begun} {next}");
+        assert_eq!(step(3.0, tool(135.0, true)), (135.0, true), "put");
+        let lifted = step(4.0, tool(145.0, false));
+        assert_eq!(lifted, (145.0, false), "it holds nothing");
     }
 }

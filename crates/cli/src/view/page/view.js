@@ -202,13 +202,14 @@ function ask() {
     return;
   }
   const now = performance.now();
-  const grasp = kind === "press" && at("grasp").checked && hand.pressed(now);
+  const grasp = kind === "press" && at("grasp").checked && hand.pressed(status.steps);
+  status.grasp = grasp;
   if (moved.length > 0) {
     const found = grasp ? pulled(pointer) : place(pointer);
     if (found) hand.aim(found);
   }
   const radius = radiusOf(kind, Number(at("radius").value));
-  const pose = hand.pose(now, { depth: Number(at("depth").value), radius });
+  const pose = hand.pose(now, { depth: Number(at("depth").value), radius, grasp });
   say({ tool: { ...pose, radius, half_length: HALF_LENGTH, friction: Number(at("friction").value), grasp, kind }, sequence });
 }
 
