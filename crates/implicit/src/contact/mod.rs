@@ -36,7 +36,7 @@ mod tool_use;
 pub use compliance::{Compliance, Tangent};
 pub use delassus::Delassus;
 pub use past::{Force, Past};
-pub use problem::ContactProblem;
+pub use problem::{ContactProblem, Work};
 pub use rows::{Pair, outward};
 pub use state::State;
 pub use state::vector;

@@ -84,6 +84,8 @@ struct ToolStep<'a> {
     context: SolverContext<'a>,
     input: &'a Input<'a>,
     problem: &'a mut ContactProblem,
+    /// The guess is linear elasticity from rest: falling back to that would make it a second time.
+    guessed_from_rest: bool,
     report: Report,
 }
 
@@ -191,7 +193,8 @@ impl ToolStep<'_> {
     /// their way; in so many that the first of them does not halve the smallest det F, with an iteration each.
     fn guess_loaded(&mut self, at: &mut Iterate<'_>) -> Result<()> {
         let env = self.context.env();
-        if self.solver.motion.min_det < SMALLEST_DET && !self.input.still {
+        self.guessed_from_rest = self.solver.motion.min_det < SMALLEST_DET && !self.input.still;
+        if self.guessed_from_rest {
             return self.respond_from_rest(at);
         }
         // Held tissue beside a cut: the linear response of the intact body would tear at what is no longer there.

@@ -246,7 +246,7 @@ impl Solution {
                 // The next linearisation is about where these forces take the samples.
                 row.point += self.sweeps.shift(at) * part;
             }
-            if part < 1.0 && extra > 0 && !is_short {
+            if part < 1.0 && extra > 0 && !is_short && !work.is_late() {
                 let forces = self.forces.iter_mut().zip(&self.earlier);
                 forces.for_each(|(now, before)| *now = *before + (*now - *before) * part);
                 extra -= 1;

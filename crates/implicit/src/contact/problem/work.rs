@@ -4,6 +4,8 @@
 //!
 //! REQ-046: The work of the contact solves of a step is bounded for any poses of tools (twice that where ties or loads act and the first guess is of no use), and what they left unsolved is told by a flag.
 
+use std::time::Duration;
+
 use crate::clock::Instant;
 use crate::memory::HeldBytes;
 
@@ -24,9 +26,10 @@ const LATE_PARTS: u32 = 2;
 #[derive(Debug, HeldBytes)]
 pub struct Work {
     solves: u64,
-    /// When the step's budget of time ends, and when half of it is over.
+    /// When the step's budget of time ends, when half of it is over, and when it would end a second time.
     until: Option<Instant>,
     half: Option<Instant>,
+    twice: Option<Instant>,
 }
 
 impl Work {
@@ -36,6 +39,7 @@ impl Work {
             solves: SOLVES_WORK,
             until: None,
             half: None,
+            twice: None,
         }
     }
 
@@ -49,6 +53,7 @@ impl Work {
             solves: solves + more,
             until: None,
             half: None,
+            twice: None,
         }
     }
 
@@ -62,12 +67,12 @@ impl Work {
         self.solves = self.solves.saturating_sub(work);
     }
 
-    /// A solve begins: whether it is short of work.
+    /// A solve begins: whether it is short of work, or of time.
     pub fn begin_solve(&mut self) -> bool {
         if self.is_spent() {
             self.solves = 0;
         }
-        self.solves < SHORT_OF_WORK
+        self.solves < SHORT_OF_WORK || self.is_half_over()
     }
 
     /// What a solve may take.
@@ -83,7 +88,15 @@ impl Work {
     pub fn end_by(&mut self, until: Option<Instant>) {
         self.until = until;
         let now = Instant::now();
-        self.half = until.map(|until| now + until.saturating_duration_since(now) / 2);
+        let left = until.map(|until| until.saturating_duration_since(now));
+        self.half = left.map(|left| now + left / 2);
+        self.twice = until.zip(left).map(|(until, left)| until + left);
+    }
+
+    /// Whether what takes so long, and begins now, ends before the budget of time would be over a second time.
+    pub fn ends_in_twice(&self, takes: Duration) -> bool {
+        self.twice
+            .is_none_or(|twice| Instant::now() + takes <= twice)
     }
 
     /// Whether half of the step's budget of time is over: too late for iterations that a guess could do without.

@@ -22,6 +22,7 @@ mod factor;
 mod iteration;
 mod linear;
 mod linearisation;
+mod making;
 mod near;
 mod pairs;
 mod record;
@@ -35,6 +36,7 @@ use ::elements::Scratch;
 use self::clusters::Clusters;
 use self::course::{WHOLE, Wanted};
 use self::linear::WHAT;
+use self::making::Making;
 use self::near::{NearSet, level_of};
 use self::pairs::Pairs;
 use self::sets::{Coming, Set};
@@ -43,6 +45,7 @@ use self::step::{add, dot, resize};
 use super::far::FarField;
 use super::input::{Input, SolverContext};
 use super::precondition::{Env, Preconditioner};
+use crate::clock::Instant;
 use crate::contact::ContactProblem;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
@@ -86,6 +89,8 @@ pub struct LocalSolver {
     d: Moved,
     residuals: Residuals,
     pub(super) measured: Measured,
+    #[held(skip)]
+    pub(super) making: Making,
     spare: Spare,
 }
 
@@ -107,6 +112,7 @@ impl LocalSolver {
             d: Moved::with_modes(count)?,
             residuals: Residuals::new(nodes, count)?,
             measured: Measured::new(env),
+            making: Making::default(),
             spare: Spare::new(env)?,
         })
     }
@@ -208,7 +214,9 @@ impl LocalSolver {
             // What the pairs know of a narrower set is linear where the wider one is not.
             pairs.clear();
         }
-        if !(self.set.is_of(now) && self.set.near.made == WHOLE) {
+        let started = Instant::now();
+        let is_made = self.set.is_of(now) && self.set.near.made == WHOLE;
+        if !is_made {
             pairs.forget_layout();
             if let Some(other) = &mut coming.other
                 && other.is_of(now)
@@ -221,6 +229,9 @@ impl LocalSolver {
         let Set { near, factor, .. } = &mut self.set;
         let last = &mut coming.last_factor;
         let is_new = factor.renew((env, near, far), u, &mut now.tangent, last)?;
+        if !is_made {
+            self.making.took(started.elapsed());
+        }
         pairs.lay_out(env, near, room)?;
         // One dear thing a step.
         if wanted.is_due && !is_other && !is_new {

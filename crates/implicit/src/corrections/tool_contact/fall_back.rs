@@ -21,8 +21,9 @@ impl ToolStep<'_> {
         // First candidate: the guess, pressed on until the tissue is out of the tools.
         let mut left = self.press_on(SUNK_MM, at.u)?;
         self.keep(at)?;
-        if left > SUNK_MM {
-            // Second: linear elasticity from rest, with no history but the tools' places.
+        // Second: linear elasticity from rest, with no history but the tools' places; a guess that inverts elements makes the next step begin there.
+        let has_time = !self.problem.work.is_late();
+        if left > SUNK_MM && has_time && !self.guessed_from_rest {
             self.respond_from_rest(at)?;
             let from_rest = self.press_on(SUNK_MM, at.u)?;
             // No force at all: the tool lies where samples cannot see it, and the tissue is where no tool pushed it.

@@ -27,13 +27,15 @@ pub(in crate::corrections) fn make_loaded(
         context,
         input,
         problem,
+        guessed_from_rest: false,
         report: Report::default(),
     };
     let _awake = context.pool.keep_awake();
     step.balance_loaded(next, from_published, true)?;
-    // Tools that no single step follows stop on their way, at last where they were; beside one that was put elsewhere they do so at once.
-    let first = usize::from(step.problem.ways.has_leapt);
-    for thicknesses in &STOPS[first..] {
+    // Tools that no single step follows stop on their way, at last where they were; beside one that was put elsewhere they do so at once, and where a budget of
+    // time is over.
+    let at_once = step.problem.ways.has_leapt || step.problem.work.is_late();
+    for thicknesses in &STOPS[usize::from(at_once)..] {
         if !(step.problem.ways).has_passed(
             &step.problem.past,
             &step.problem.next,

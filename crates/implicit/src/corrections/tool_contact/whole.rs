@@ -42,6 +42,7 @@ impl ToolStep<'_> {
             input,
             problem,
             report,
+            ..
         } = self;
         let env = context.env();
         let unbalanced = |g: &[f32], to: &mut Vec<f32>| {
