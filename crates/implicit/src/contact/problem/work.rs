@@ -18,7 +18,7 @@ const LONGEST_SOLVES_WORK: u64 = 3 * SOLVES_WORK;
 /// What is left when solves begin to take fewer samples.
 const SHORT_OF_WORK: u64 = SOLVES_WORK / 2;
 
-/// Parts of the tools' ways in a step that has taken its work, or its time.
+/// Parts of the tools' ways in a step that has taken its work, or half of its time.
 const LEAST_PARTS: u32 = 4;
 const LATE_PARTS: u32 = 2;
 
@@ -114,9 +114,9 @@ impl Work {
         self.solves == 0 || self.is_late()
     }
 
-    /// The part of `parts` of the tools' ways to take after part `part`: the next, or one of `LEAST_PARTS` once the solves have taken their time.
+    /// The part of `parts` of the tools' ways to take after part `part`: the next, or one of `LEAST_PARTS` once the solves have taken their work, or half of their time.
     pub fn next_part(&self, part: u32, parts: u32) -> u32 {
-        let stride = match self.is_spent() {
+        let stride = match self.is_spent() || self.is_half_over() {
             true => parts.div_ceil(self.least_parts()),
             false => 1,
         };
@@ -125,7 +125,7 @@ impl Work {
 
     /// Parts of the tools' ways where there is little work or time left.
     pub(super) fn least_parts(&self) -> u32 {
-        if self.is_late() {
+        if self.is_half_over() {
             LATE_PARTS
         } else {
             LEAST_PARTS
