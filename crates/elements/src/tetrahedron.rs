@@ -65,13 +65,7 @@ impl Tetrahedron {
                 }
             }
         }
-        let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
-        Deformation {
-            f,
-            cofactor,
-            det: dot(f[0], cofactor[0]),
-            invariant: f.iter().map(|row| dot(*row, *row)).sum(),
-        }
+        Deformation::of(f)
     }
 
     /// `V P g_a` of the four corners, µN; they are in balance.
@@ -107,6 +101,17 @@ impl Tetrahedron {
 }
 
 impl Deformation {
+    /// That of a deformation gradient, rows.
+    pub fn of(f: [[f64; 3]; 3]) -> Deformation {
+        let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
+        Deformation {
+            f,
+            cofactor,
+            det: dot(f[0], cofactor[0]),
+            invariant: f.iter().map(|row| dot(*row, *row)).sum(),
+        }
+    }
+
     /// `I1`, `I2` and `det^(-1/3)`, where `det` stands for `det F`.
     pub fn invariants(&self, det: f64) -> Invariants {
         Invariants {

@@ -5,7 +5,7 @@
     reason = "components of tensors read best by index"
 )]
 
-use elements::vector::{cross, dot};
+use elements::vector::dot;
 use elements::{
     Deformation, Law, Material, Moduli, MooneyRivlin, VerondaWestmann, Yeoh, energy_density, stress,
 };
@@ -44,19 +44,9 @@ fn growing() -> Vec<Moduli> {
     .into()
 }
 
-fn state(f: Matrix) -> Deformation {
-    let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
-    Deformation {
-        f,
-        cofactor,
-        det: dot(f[0], cofactor[0]),
-        invariant: f.iter().map(|row| dot(*row, *row)).sum(),
-    }
-}
-
 /// Cauchy stress `P F^T / J`.
 fn cauchy(f: Matrix, moduli: Moduli) -> Matrix {
-    let state = state(f);
+    let state = Deformation::of(f);
     let p = stress(&state, moduli);
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| dot(p[i], f[j]) / state.det))
 }
@@ -79,13 +69,13 @@ fn near(got: f64, want: f64, scale: f64) {
 fn stress_is_the_derivative_of_the_energy() {
     let f = [[1.3, 0.2, -0.1], [-0.15, 0.8, 0.25], [0.05, -0.3, 1.1]];
     for moduli in laws().into_iter().chain(growing()) {
-        let p = stress(&state(f), moduli);
+        let p = stress(&Deformation::of(f), moduli);
         for i in 0..3 {
             for j in 0..3 {
                 let at = |step: f64| {
                     let mut f = f;
                     f[i][j] += step;
-                    energy_density(&state(f), moduli)
+                    energy_density(&Deformation::of(f), moduli)
                 };
                 let step = 1e-3;
                 // Fourth order.
@@ -104,7 +94,7 @@ fn at_rest_every_law_is_linear_elasticity() {
     let trace = gradient[0][0] + gradient[1][1] + gradient[2][2];
     for moduli in laws().into_iter().chain(growing()) {
         assert!(
-            stress(&state(identity()), moduli)
+            stress(&Deformation::of(identity()), moduli)
                 .as_flattened()
                 .iter()
                 .all(|p| p.abs() < 1e-9)
@@ -116,7 +106,7 @@ fn at_rest_every_law_is_linear_elasticity() {
                     f[i][j] += step * gradient[i][j];
                 }
             }
-            stress(&state(f), moduli)
+            stress(&Deformation::of(f), moduli)
         };
         let step = 1e-4;
         let (ahead, behind) = (at(step), at(-step));

@@ -5,7 +5,7 @@
     reason = "components of tensors read best by index"
 )]
 
-use elements::vector::{cross, dot};
+use elements::vector::dot;
 use elements::{
     Deformation, Law, Material, Moduli, MooneyRivlin, Ogden, Tetrahedron, energy_density, stress,
     tangent,
@@ -33,16 +33,6 @@ fn ogden(terms: &[[f64; 2]]) -> Moduli {
 
 fn laws() -> impl Iterator<Item = Moduli> {
     LAWS.into_iter().map(ogden)
-}
-
-fn state(f: Matrix) -> Deformation {
-    let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
-    Deformation {
-        f,
-        cofactor,
-        det: dot(f[0], cofactor[0]),
-        invariant: f.iter().map(|row| dot(*row, *row)).sum(),
-    }
 }
 
 fn diagonal([a, b, c]: [f64; 3]) -> Matrix {
@@ -80,7 +70,7 @@ fn shapes() -> Vec<Matrix> {
 }
 
 fn cauchy(f: Matrix, moduli: Moduli) -> Matrix {
-    let state = state(f);
+    let state = Deformation::of(f);
     let p = stress(&state, moduli);
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| dot(p[i], f[j]) / state.det))
 }
@@ -104,11 +94,11 @@ fn slope(f: Matrix, [i, j]: [usize; 2], of: impl Fn(Matrix) -> f64) -> f64 {
 fn stress_is_the_derivative_of_the_energy() {
     for moduli in laws() {
         for f in shapes() {
-            let p = stress(&state(f), moduli);
+            let p = stress(&Deformation::of(f), moduli);
             let scale = largest(p.as_flattened());
             for i in 0..3 {
                 for j in 0..3 {
-                    let want = slope(f, [i, j], |f| energy_density(&state(f), moduli));
+                    let want = slope(f, [i, j], |f| energy_density(&Deformation::of(f), moduli));
                     let off = (p[i][j] - want).abs() / scale;
                     assert!(off < 1e-7, "{}: {off:e}", moduli.law);
                 }
@@ -128,13 +118,13 @@ fn the_tangent_is_the_derivative_of_the_stress_for_every_law() {
     ];
     for moduli in laws().chain(others.map(moduli)) {
         for f in shapes() {
-            let whole = tangent(&state(f), moduli);
+            let whole = tangent(&Deformation::of(f), moduli);
             let scale = largest(whole.as_flattened());
             for row in 0..9 {
                 for column in 0..9 {
                     let [i, j] = [row / 3, row % 3];
                     let at = [column / 3, column % 3];
-                    let want = slope(f, at, |f| stress(&state(f), moduli)[i][j]);
+                    let want = slope(f, at, |f| stress(&Deformation::of(f), moduli)[i][j]);
                     let off = (whole[row][column] - want).abs() / scale;
                     assert!(off < 1e-7, "{}: {off:e}", moduli.law);
                     let off = (whole[row][column] - whole[column][row]).abs() / scale;
@@ -150,10 +140,10 @@ fn stress_turns_with_the_frame_and_not_with_the_material() {
     let q = turned(1.1);
     for moduli in laws() {
         for f in shapes() {
-            let p = stress(&state(f), moduli);
+            let p = stress(&Deformation::of(f), moduli);
             let scale = largest(p.as_flattened());
-            let framed = stress(&state(product(q, f)), moduli);
-            let turned = stress(&state(product(f, q)), moduli);
+            let framed = stress(&Deformation::of(product(q, f)), moduli);
+            let turned = stress(&Deformation::of(product(f, q)), moduli);
             let (want_framed, want_turned) = (product(q, p), product(p, q));
             for i in 0..3 {
                 for j in 0..3 {
@@ -189,7 +179,7 @@ fn stretches_that_nearly_coincide_are_right() {
                 let root = volume.cbrt();
                 let pulls = l.map(|l| pull(terms, l / root));
                 let mean = pulls.iter().sum::<f64>() / 3.0;
-                let p = stress(&state(diagonal(l)), moduli);
+                let p = stress(&Deformation::of(diagonal(l)), moduli);
                 let pressure = moduli.bulk_pa * (volume - 1.0);
                 let want =
                     [0, 1, 2].map(|i| ((pulls[i] - mean) / volume + pressure) * volume / l[i]);
@@ -243,14 +233,14 @@ fn exponents_two_and_minus_two_are_the_other_laws() {
     ];
     for (terms, law) in pairs {
         for f in shapes() {
-            let got = stress(&state(f), ogden(&terms));
-            let want = stress(&state(f), moduli(law));
+            let got = stress(&Deformation::of(f), ogden(&terms));
+            let want = stress(&Deformation::of(f), moduli(law));
             let scale = largest(want.as_flattened());
             for (got, want) in got.as_flattened().iter().zip(want.as_flattened()) {
                 assert!((got - want).abs() < 1e-12 * scale, "{got} for {want}");
             }
-            let got = energy_density(&state(f), ogden(&terms));
-            let want = energy_density(&state(f), moduli(law));
+            let got = energy_density(&Deformation::of(f), ogden(&terms));
+            let want = energy_density(&Deformation::of(f), moduli(law));
             assert!((got - want).abs() < 1e-12 * want);
         }
     }
@@ -315,12 +305,12 @@ fn crushed_and_inverted_shapes_have_finite_stress() {
             [1e-3, 1.0, 1.0],
             [-0.2, 1.0, 1.0],
         ] {
-            let p = stress(&state(diagonal(l)), moduli);
+            let p = stress(&Deformation::of(diagonal(l)), moduli);
             assert!(p.as_flattened().iter().all(|p| p.is_finite()), "{l:?}");
-            let whole = tangent(&state(diagonal(l)), moduli);
+            let whole = tangent(&Deformation::of(diagonal(l)), moduli);
             assert!(whole.as_flattened().iter().all(|k| k.is_finite()), "{l:?}");
         }
-        let density = energy_density(&state(diagonal([0.05, 1.0, 1.0])), moduli);
+        let density = energy_density(&Deformation::of(diagonal([0.05, 1.0, 1.0])), moduli);
         assert!(density.is_finite() && density > 0.0);
     }
 }

@@ -9,7 +9,7 @@
 use std::str::FromStr;
 
 use anyhow::{Result, bail};
-use elements::{Deformation, Law, Moduli, Ogden, stress, vector};
+use elements::{Deformation, Law, Moduli, Ogden, stress};
 
 /// Intervals of Simpson's rule over the radius of a cylinder.
 const RINGS: usize = 32;
@@ -134,23 +134,13 @@ pub struct Scaled {
 impl Scaled {
     /// `P` and `cof F` of a deformation that keeps the volume.
     fn stress(&self, f: [[f64; 3]; 3]) -> [[[f64; 3]; 3]; 2] {
-        let cofactor = [
-            vector::cross(f[1], f[2]),
-            vector::cross(f[2], f[0]),
-            vector::cross(f[0], f[1]),
-        ];
-        let state = Deformation {
-            f,
-            cofactor,
-            det: vector::dot(f[0], cofactor[0]),
-            invariant: f.iter().flatten().map(|x| x * x).sum(),
-        };
+        let state = Deformation::of(f);
         let moduli = Moduli {
             shear_pa: self.shear_pa,
             bulk_pa: self.shear_pa,
             law: self.law,
         };
-        [stress(&state, moduli), cofactor]
+        [stress(&state, moduli), state.cofactor]
     }
 }
 

@@ -1,12 +1,12 @@
-//! The constants of laws that stiffen with the first invariant: Yeoh's and Veronda and Westmann's, by the method and the residuals of [`super::least_squares`].
+//! The constants of laws that stiffen with the first invariant: Yeoh's and Veronda and Westmann's, by [`super::least_squares`].
 //!
 //! Yeoh's unknowns are `C1`, `C2` and `C3`, at least 0 each, so that the law is elliptic; Veronda and Westmann's are the shear modulus and `beta`.
 
 use anyhow::{Result, bail};
 use elements::{Law, VerondaWestmann, Yeoh};
-use rmpfit::{MPFitter, MPPar, MPResult, MPSide};
 
-use super::curve::{Curve, Scaled, nominal_stress};
+use super::curve::{Curve, Scaled};
+use super::least_squares::{self, Unknown};
 
 /// Exponents that are sought, and from where.
 const BETAS: [f64; 2] = [0.4, 1000.0];
@@ -20,97 +20,46 @@ pub enum Growing {
     VerondaWestmann,
 }
 
-struct Problem<'a> {
-    which: Growing,
-    curves: &'a [Curve],
-    /// Largest stress over all curves, Pa: the unit of the shear modulus.
-    unit: f64,
-    bounds: Vec<MPPar>,
-}
-
-impl Problem<'_> {
-    fn law(&self, unknown: &[f64]) -> Scaled {
-        let shear_pa = self.unit * unknown[0];
-        let law = match self.which {
-            Growing::VerondaWestmann => Law::VerondaWestmann(VerondaWestmann { beta: unknown[1] }),
+impl Growing {
+    /// That of some constants, the first of them a stiffness in units of `unit`, Pa.
+    fn law(self, constants: &[f64], unit: f64) -> Scaled {
+        let law = match self {
+            Growing::VerondaWestmann => {
+                Law::VerondaWestmann(VerondaWestmann { beta: constants[1] })
+            }
             Growing::Yeoh(_) => {
-                let over = |at: usize| unknown.get(at).map_or(0.0, |c| c / unknown[0].max(1e-9));
+                let over = |at: usize| {
+                    let of = |c: &f64| c / constants[0].max(1e-9);
+                    constants.get(at).map_or(0.0, of)
+                };
                 Law::Yeoh(Yeoh {
                     c2_over_c1: over(1),
                     c3_over_c1: over(2),
                 })
             }
         };
-        Scaled { law, shear_pa }
-    }
-}
-
-impl MPFitter for Problem<'_> {
-    fn eval(&mut self, unknown: &[f64], errors: &mut [f64]) -> MPResult<()> {
-        let law = self.law(unknown);
-        let points = self.curves.iter().flat_map(|curve| {
-            let scale = 1.0 / curve.largest();
-            (curve.points.iter()).map(move |point| (curve.mode, scale, point))
-        });
-        for (error, (mode, scale, [x, y])) in errors.iter_mut().zip(points) {
-            *error = scale * (nominal_stress(&law, mode, *x) - y);
+        Scaled {
+            law,
+            shear_pa: unit * constants[0],
         }
-        Ok(())
-    }
-
-    fn number_of_points(&self) -> usize {
-        self.curves.iter().map(|curve| curve.points.len()).sum()
-    }
-
-    fn parameters(&self) -> &[MPPar] {
-        &self.bounds
-    }
-}
-
-/// Bounds of a constant.
-fn bound(low: f64, up: f64) -> MPPar {
-    MPPar {
-        limited_low: true,
-        limit_low: low,
-        limited_up: up.is_finite(),
-        limit_up: if up.is_finite() { up } else { 0.0 },
-        side: MPSide::Both,
-        ..MPPar::new()
     }
 }
 
 /// The best law of all starts.
 pub fn best(curves: &[Curve], which: Growing) -> Result<Scaled> {
-    let unit = curves.iter().map(Curve::largest).fold(0.0, f64::max);
-    let starts = match which {
-        Growing::Yeoh(count) => vec![vec![1.0; count]],
-        Growing::VerondaWestmann => STARTS.map(|beta| vec![1.0, beta]).into(),
+    let unit = least_squares::unit(curves);
+    let stiffness = || Unknown::between(1.0, [0.0, f64::INFINITY]);
+    let starts: Vec<Vec<Unknown>> = match which {
+        Growing::Yeoh(count) => vec![(0..count).map(|_| stiffness()).collect()],
+        Growing::VerondaWestmann => STARTS
+            .map(|beta| vec![stiffness(), Unknown::between(beta, BETAS)])
+            .into(),
     };
-    let bound_of = |at: usize| match which {
-        Growing::VerondaWestmann if at == 1 => bound(BETAS[0], BETAS[1]),
-        _ => bound(0.0, f64::INFINITY),
-    };
-    let mut best: Option<(f64, Scaled)> = None;
-    for mut unknown in starts {
-        let mut problem = Problem {
-            which,
-            curves,
-            unit,
-            bounds: (0..unknown.len()).map(bound_of).collect(),
-        };
-        // A start that leads nowhere is left to the others.
-        let Ok(status) = problem.mpfit(&mut unknown) else {
-            continue;
-        };
-        let cost = status.best_norm;
-        if cost.is_finite() && best.is_none_or(|(least, _)| cost < least) {
-            best = Some((cost, problem.law(&unknown)));
-        }
-    }
-    match best {
-        Some((_, law)) if law.shear_pa > 1e-6 * unit => Ok(law),
-        Some(_) => bail!("no law fits: the shear modulus comes out as zero"),
-        None => bail!("no law fits: fewer points than constants, or residuals that are not finite"),
+    let constants =
+        least_squares::best(curves, starts, |constants| Some(which.law(constants, unit)))?;
+    match which.law(&constants, unit) {
+        law if law.shear_pa > 1e-6 * unit => Ok(law),
+        _ => bail!("no law fits: the shear modulus comes out as zero"),
     }
 }
 

@@ -4,8 +4,9 @@ pub mod curve;
 pub mod data;
 mod growing;
 mod hold;
-pub mod least_squares;
+mod least_squares;
 pub mod plot;
+pub mod stretches;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -20,7 +21,7 @@ use curve::{Response, Scaled};
 use data::Sample;
 use growing::Growing;
 use hold::Hold;
-use least_squares::Exponents;
+use stretches::Exponents;
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -216,7 +217,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         ),
         _ => bail!("--exponents goes with --law ogden:TERMS"),
     };
-    let terms = least_squares::best(&sample.curves, &exponents)?;
+    let terms = stretches::best(&sample.curves, &exponents)?;
     let found = Scaled {
         law: wanted.law(&terms),
         shear_pa: terms.shear_pa(),

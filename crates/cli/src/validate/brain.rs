@@ -11,8 +11,8 @@ use gauge::median;
 use super::section::{Section, verdict};
 use crate::fit::Wanted;
 use crate::fit::data::{self, Sample};
-use crate::fit::least_squares::best;
 use crate::fit::plot;
+use crate::fit::stretches::best;
 use crate::materials;
 
 /// Worst and median R² that are promised.

@@ -3,7 +3,7 @@
 //! Equilibria of the elements in f64 ([`tissue::statics::relax`]), which the explicit solver reaches at the end of a long hold.
 
 use anyhow::{Context, Result};
-use elements::{Deformation, Law, Material, Moduli, Ogden, stress, vector};
+use elements::{Deformation, Law, Material, Moduli, Ogden, stress};
 use tissue::mesh::{Mesh, regular_box};
 use tissue::statics::relax;
 
@@ -25,18 +25,7 @@ const CELLS: [usize; 2] = [10, 20];
 fn bar(moduli: Moduli, stretch: f64) -> [f64; 2] {
     let of = |across: f64| {
         let f = [[across, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, stretch]];
-        let cofactor = [
-            vector::cross(f[1], f[2]),
-            vector::cross(f[2], f[0]),
-            vector::cross(f[0], f[1]),
-        ];
-        let state = Deformation {
-            f,
-            cofactor,
-            det: vector::dot(f[0], cofactor[0]),
-            invariant: f.iter().flatten().map(|x| x * x).sum(),
-        };
-        stress(&state, moduli)
+        stress(&Deformation::of(f), moduli)
     };
     let (mut low, mut high) = (0.5, 2.0);
     for _ in 0..80 {

@@ -13,8 +13,8 @@ use super::section::{Section, verdict};
 use crate::fit::Wanted;
 use crate::fit::curve::{Curve, Mode, nominal_stress};
 use crate::fit::data::Table;
-use crate::fit::least_squares::best;
 use crate::fit::plot;
+use crate::fit::stretches::best;
 
 /// Median and worst relative error of the force that are promised.
 const BAR: [f64; 2] = [0.05, 0.10];

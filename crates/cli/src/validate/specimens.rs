@@ -16,7 +16,7 @@ use super::equilibrium::{ends, forces};
 use super::section::{Section, verdict};
 use crate::fit::curve::{Curve, Mode, nominal_stress};
 use crate::fit::data::{self, Sample};
-use crate::fit::least_squares::{Exponents, best};
+use crate::fit::stretches::{Exponents, best};
 
 /// Side of a specimen, mm.
 const SIDE: f32 = 5.0;

@@ -13,7 +13,7 @@
 
 mod cut;
 
-use ::elements::{Deformation, Law, Moduli, stress, vector};
+use ::elements::{Deformation, Law, Moduli, stress};
 
 use super::body::Body;
 use crate::bundle::{Mesh, volume};
@@ -221,18 +221,7 @@ impl FarField {
                 *value = h[3 * i + j] + if i == j { 1.0 } else { 0.0 };
             }
         }
-        let cofactor = [
-            vector::cross(f[1], f[2]),
-            vector::cross(f[2], f[0]),
-            vector::cross(f[0], f[1]),
-        ];
-        let det = vector::dot(f[0], cofactor[0]);
-        let state = Deformation {
-            f,
-            cofactor,
-            det,
-            invariant: f.iter().map(|row| vector::dot(*row, *row)).sum(),
-        };
+        let state = Deformation::of(f);
         let stress = stress(&state, self.moduli_of(cluster));
         let lambda = self.moduli.bulk_pa - 2.0 / 3.0 * self.moduli.shear_pa;
         let trace = h[0] + h[4] + h[8];
@@ -244,6 +233,6 @@ impl FarField {
                 added[3 * i + j] = stress[i][j] - self.moduli.shear_pa * both - volume;
             }
         }
-        (added, det)
+        (added, state.det)
     }
 }

@@ -6,7 +6,6 @@ use super::touch::{ToolPose, Touch};
 use super::{ContactNode, FrameReport, Solver, SolverError};
 use elements::Chunk;
 use elements::shape_gradients;
-use elements::vector::{cross, dot};
 use elements::{Deformation, Moduli, shape_energy};
 use rayon::prelude::*;
 
@@ -231,13 +230,7 @@ fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4], moduli: Modul
             }
         }
     }
-    let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
-    let deformation = Deformation {
-        f,
-        cofactor,
-        det: dot(f[0], cofactor[0]),
-        invariant: f.iter().map(|row| dot(*row, *row)).sum(),
-    };
+    let deformation = Deformation::of(f);
     ElementState {
         volume: volume.abs(),
         bound: stiffest(&gradients, &deformation, moduli),

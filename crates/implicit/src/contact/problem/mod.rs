@@ -41,7 +41,7 @@ use solution::Solution;
 use surface::Surface;
 use tie_set::TieSet;
 use ways::ToolWays;
-pub use work::Work;
+pub(crate) use work::Work;
 
 /// A tool that goes farther in a step is quick, mm.
 const QUICK_MM: f32 = 0.5;
