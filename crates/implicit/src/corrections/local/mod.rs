@@ -36,7 +36,6 @@ use ::elements::Scratch;
 use self::clusters::Clusters;
 use self::course::{WHOLE, Wanted};
 use self::linear::WHAT;
-use self::making::Making;
 use self::near::{NearSet, level_of};
 use self::pairs::Pairs;
 use self::sets::{Coming, Set};
@@ -89,8 +88,6 @@ pub struct LocalSolver {
     d: Moved,
     residuals: Residuals,
     pub(super) measured: Measured,
-    #[held(skip)]
-    pub(super) making: Making,
     spare: Spare,
 }
 
@@ -112,7 +109,6 @@ impl LocalSolver {
             d: Moved::with_modes(count)?,
             residuals: Residuals::new(nodes, count)?,
             measured: Measured::new(env),
-            making: Making::default(),
             spare: Spare::new(env)?,
         })
     }
@@ -230,7 +226,7 @@ impl LocalSolver {
         let last = &mut coming.last_factor;
         let is_new = factor.renew((env, near, far), u, &mut now.tangent, last)?;
         if !is_made {
-            self.making.took(started.elapsed());
+            coming.making.took(started.elapsed());
         }
         pairs.lay_out(env, near, room)?;
         // One dear thing a step.

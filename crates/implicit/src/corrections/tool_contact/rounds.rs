@@ -45,7 +45,7 @@ impl ToolStep<'_> {
         let (work, local) = (&self.problem.work, &mut self.solver.local);
         // A tool that was put elsewhere comes out over a few steps: the near set about it need not be made in one that it would make too long.
         let is_long = self.problem.ways.has_leapt
-            && (local.as_mut()).is_some_and(|local| !local.making.fits(work));
+            && (local.as_mut()).is_some_and(|local| !local.coming.making.fits(work));
         if work.is_spent() || is_long {
             // No iteration would begin, and its base takes as long as several.
             self.report.residual = 1.0;
