@@ -197,23 +197,51 @@ fn make_bundles(workspace: &Workspace) -> Result<()> {
     Ok(())
 }
 
-/// A bundle's files, compressed, without its certificate.
+/// A bundle's files, compressed, without its certificate and what the page does not read.
 fn write_bundle(from: &Path, to: &Path) -> Result<()> {
     std::fs::create_dir_all(to)?;
+    let path = from.join("bundle.json");
+    let bytes = std::fs::read(&path).with_context(|| path.display().to_string())?;
+    let mut manifest = serde_json::from_slice(&bytes)?;
+    let left_out = without_release(&mut manifest);
     for (name, place) in Workspace::bundle_files(from)? {
-        compress(&place, &to.join(name))?;
+        if name == "bundle.json" {
+            pack(&serde_json::to_vec(&manifest)?, &to.join(name))?;
+        } else if left_out.as_ref() != Some(&name) {
+            compress(&place, &to.join(name))?;
+        }
     }
     Ok(())
+}
+
+/// Takes what was learned about releases out of a manifest, and gives its file: steps of another length than the bundle's, as the page's are, do not read it.
+fn without_release(manifest: &mut Value) -> Option<String> {
+    let step = &manifest["corrections"]["frame_step_s"];
+    if step.is_null() || *step == manifest["dt_s"] {
+        return None;
+    }
+    let release = manifest["prior"].as_object_mut()?.remove("release")?;
+    let name = release.as_str()?.to_owned();
+    manifest["files"].as_object_mut()?.remove(&name);
+    let requires = manifest["requires"].as_array_mut()?;
+    requires.retain(|word| word != "release");
+    // Of the whole manifest; one without it is taken.
+    manifest.as_object_mut()?.remove("manifest_sha256");
+    Some(name)
 }
 
 /// A file as `NAME.gz`.
 fn compress(from: &Path, to: &Path) -> Result<()> {
     let bytes = std::fs::read(from).with_context(|| format!("cannot read {}", from.display()))?;
+    pack(&bytes, to)
+}
+
+fn pack(bytes: &[u8], to: &Path) -> Result<()> {
     let mut name = to.as_os_str().to_owned();
     name.push(".gz");
     let file = std::fs::File::create(&name)?;
     let mut packed = GzBuilder::new().mtime(0).write(file, Compression::best());
-    packed.write_all(&bytes)?;
+    packed.write_all(bytes)?;
     packed.finish()?;
     Ok(())
 }
@@ -251,5 +279,24 @@ mod tests {
         let whole = [&head[..], &long, &types, &[0, 1, 0]].concat();
         assert_eq!(without_names(&whole), Some([&head[..], &types].concat()));
         assert_eq!(without_names(&whole[..20]), None);
+    }
+
+    #[test]
+    fn the_page_loads_no_release_that_its_steps_do_not_read() {
+        let mut manifest = json!({
+            "dt_s": 0.05, "requires": ["release", "vibration"], "corrections": {"frame_step_s": 0.02},
+            "prior": {"file": "prior.st", "release": "release.st"},
+            "files": {"prior.st": {}, "release.st": {}}, "manifest_sha256": "0",
+        });
+        let mut same_step = manifest.clone();
+        same_step["dt_s"] = json!(0.02);
+        assert_eq!(without_release(&mut same_step), None);
+        let name = without_release(&mut manifest);
+        assert_eq!(name.as_deref(), Some("release.st"));
+        let wanted = json!({
+            "dt_s": 0.05, "requires": ["vibration"], "corrections": {"frame_step_s": 0.02},
+            "prior": {"file": "prior.st"}, "files": {"prior.st": {}},
+        });
+        assert_eq!(manifest, wanted);
     }
 }
