@@ -16,6 +16,8 @@ pub struct Loads {
     /// On the nodes of the mesh `[K,3]`, mN; empty for none. In a body that has been cut the tissue at a node's place takes its force
     /// ([`topology::Body::carriers`]).
     pub forces: Vec<[f32; 3]>,
+    /// At points of the tissue, given by nodes of the body as it is now, mN.
+    pub points: Vec<Push>,
     /// A face in several of them takes their sum.
     pub pressures: Vec<SurfacePressure>,
 }

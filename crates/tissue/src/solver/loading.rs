@@ -87,7 +87,7 @@ impl Solver {
                 add(*node as usize, force.map(|f| 1e3 * part * f64::from(f)));
             }
         }
-        for push in &load.pushed[1] {
+        for push in load.pushed[1].iter().chain(&loads.points) {
             for (node, weight) in push.nodes.into_iter().zip(push.weights) {
                 add(node as usize, push.force.map(|f| 1e3 * weight * f));
             }

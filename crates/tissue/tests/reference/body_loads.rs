@@ -177,6 +177,7 @@ fn loads_bring_the_energy_that_the_body_has() {
         gravity: [4000.0, 0.0, -4000.0],
         forces,
         pressures: on_all_faces(&mesh, 60.0),
+        ..Loads::default()
     };
     solver.set_loads(&loads).unwrap();
     for frame in 0..8 {

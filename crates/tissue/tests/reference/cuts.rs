@@ -163,6 +163,7 @@ fn loaded(solver: &mut Solver, mesh: &Mesh, force_at: usize) -> Vec<[f32; 3]> {
             pascal: 40.0,
             walls: true,
         }],
+        ..Loads::default()
     };
     solver.set_loads(&loads).unwrap();
     for _ in 0..24 {
