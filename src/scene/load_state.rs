@@ -113,15 +113,16 @@ impl LoadState {
         Ok(())
     }
 
-    /// Takes the loads at the end of a step of `step_s` of a body of these masses, g, which is displaced by `u [K,3]` and moves at `v` (mm/s) at its start.
+    /// Takes the loads at the end of a step of `step_s` of a body of these masses, g, which is displaced by `u [K,3]` and moves at `v` (mm/s) at its start; `cut` is what cuts have made of it.
     pub(super) fn take(
         &mut self,
         loads: &Loads<'_>,
         mesh: &Mesh,
         mass: &[f32],
         (u, v, step_s): (&[f32], &[f32], f64),
+        cut: Option<&Body>,
     ) -> Result<()> {
-        self.forces.take(loads.point_forces)?;
+        self.forces.take(loads.point_forces, cut)?;
         let forces = &self.forces;
         supports::follow(
             mesh,

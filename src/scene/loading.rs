@@ -54,7 +54,8 @@ impl SceneLoads {
             none => none.insert(blank(body)?),
         };
         let mass = &body.model.corrections()?.body.mass;
-        state.take(loads, &body.mesh, mass, (u, v, body.step_s()))?;
+        let cut = body.cut.as_ref().map(|cut| &cut.body);
+        state.take(loads, &body.mesh, mass, (u, v, body.step_s()), cut)?;
         let acts = state.acts();
         // On a cut body the answer to gravity is the intact body's, made there once and followed by the copies of nodes.
         if state.turns() {

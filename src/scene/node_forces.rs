@@ -3,9 +3,9 @@
 use topology::Body;
 
 use super::load_limits::WHAT;
-use super::point_force::PointForce;
+use super::point_force::{Bearer, PointForce};
 use crate::bundle::Mesh;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
 
 /// See the module.
@@ -17,7 +17,7 @@ pub struct NodeForces {
     parents: Vec<u32>,
     /// By node: its part of the force on the node of the intact mesh that it is or stems from; empty for an intact body.
     takes: Vec<f32>,
-    /// Of forces at points the sum at each node of the intact mesh `[count,3]`, mN; empty without any.
+    /// Of forces at points the sum at each node of the body, mN; empty without any.
     at_points: Vec<f32>,
 }
 
@@ -62,32 +62,69 @@ impl NodeForces {
         }
     }
 
-    /// Takes the forces at points of a step.
+    /// Takes the forces at points of a step; `body` is the one that it was made with.
     ///
     /// # Errors
-    /// [`crate::Error::OutOfMemory`].
-    pub(super) fn take(&mut self, forces: &[PointForce]) -> Result<()> {
+    /// [`Error::Argument`] for one at tissue that has been removed, [`Error::OutOfMemory`].
+    pub(super) fn take(&mut self, forces: &[PointForce], body: Option<&Body>) -> Result<()> {
         self.at_points.clear();
         if forces.is_empty() {
             return Ok(());
         }
-        memory::fit(&mut self.at_points, 3 * self.count, WHAT)?;
-        self.at_points.resize(3 * self.count, 0.0);
-        for force in forces {
-            for (node, weight) in force.shares() {
-                let own = &mut self.at_points[3 * node as usize..][..3];
-                (own.iter_mut().zip(force.force)).for_each(|(own, force)| *own += weight * force);
+        let len = 3 * (self.count + self.parents.len());
+        memory::fit(&mut self.at_points, len, WHAT)?;
+        self.at_points.resize(len, 0.0);
+        let acting = forces.iter().enumerate();
+        for (index, force) in acting.filter(|(_, force)| force.force != [0.0; 3]) {
+            let is_borne = match body.map(|body| force.bearer(body)) {
+                None => {
+                    (force.shares()).for_each(|share| self.add(share, force.force));
+                    true
+                }
+                Some(Bearer::Piece(shares)) => {
+                    (shares.into_iter()).for_each(|share| self.add(share, force.force));
+                    true
+                }
+                Some(Bearer::Nodes) => {
+                    (force.shares()).all(|share| self.spread(share, force.force))
+                }
+                Some(Bearer::Gone) => false,
+            };
+            if !is_borne {
+                return Err(Error::Argument(format!(
+                    "point_forces[{index}]: of the tissue at its nodes {:?} the body has nothing left; give it a force of 0",
+                    force.nodes
+                )));
             }
         }
         Ok(())
     }
 
-    /// The force on a node, mN: its part of those at points and of `on_nodes` `[count,3]`.
+    /// A node takes a share of a force.
+    fn add(&mut self, (node, weight): (u32, f32), force: [f32; 3]) {
+        let own = &mut self.at_points[3 * node as usize..][..3];
+        (own.iter_mut().zip(force)).for_each(|(own, force)| *own += weight * force);
+    }
+
+    /// The tissue at the place of a node of the intact mesh takes a share; says whether there is any.
+    fn spread(&mut self, (node, weight): (u32, f32), force: [f32; 3]) -> bool {
+        let mut is_borne = false;
+        for own in 0..self.count + self.parents.len() {
+            let part = self.takes.get(own).unwrap_or(&1.0) * weight;
+            if self.parent(own) == node as usize && part != 0.0 {
+                self.add((own as u32, part), force);
+                is_borne = true;
+            }
+        }
+        is_borne
+    }
+
+    /// The force on a node, mN: its part of those of `on_nodes` `[count,3]`, and that at points.
     pub(super) fn on(&self, node: usize, on_nodes: Option<&[f32]>) -> [f32; 3] {
         let (from, part) = (self.parent(node), self.takes.get(node).unwrap_or(&1.0));
         [0, 1, 2].map(|axis| {
             let own = on_nodes.map_or(0.0, |forces| forces[3 * from + axis]);
-            part * (own + self.at_points.get(3 * from + axis).unwrap_or(&0.0))
+            part * own + self.at_points.get(3 * node + axis).unwrap_or(&0.0)
         })
     }
 }

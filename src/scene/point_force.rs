@@ -1,5 +1,7 @@
 //! Forces at points of the tissue, which the nodes around them share.
 
+use topology::Body;
+
 use super::load_limits::{LARGEST_FORCE, WHAT, check_size};
 use super::points::AttachedPoints;
 use crate::error::{Error, Result};
@@ -20,6 +22,16 @@ pub struct PointForce {
     pub weights: [f32; 4],
     /// mN, in the mesh's frame.
     pub force: [f32; 3],
+}
+
+/// What bears a force in a body that has been cut.
+pub(super) enum Bearer {
+    /// The nodes of the piece of an element in which the point lies, each with its share.
+    Piece([(u32, f32); 4]),
+    /// The tissue at the place of each of its nodes: it is one node, or its nodes are not of one element.
+    Nodes,
+    /// The tissue at the point has been removed.
+    Gone,
 }
 
 impl PointForce {
@@ -46,6 +58,36 @@ impl PointForce {
         };
         let all = self.nodes.into_iter().zip(weights);
         all.filter(|(_, weight)| *weight != 0.0)
+    }
+
+    /// What bears it in a body that has been cut: the side on which its point lies.
+    pub(super) fn bearer(&self, body: &Body) -> Bearer {
+        let mut shares = self.shares();
+        let first = match (shares.next(), shares.next()) {
+            (Some((node, _)), Some(_)) => node,
+            _ => return Bearer::Nodes,
+        };
+        let mut is_of_one = false;
+        for element in body.mesh().around(first) {
+            let tet = body.mesh().tet(*element);
+            let corner_of = |node| tet.iter().position(|corner| *corner == node);
+            if self.shares().any(|(node, _)| corner_of(node).is_none()) {
+                continue;
+            }
+            is_of_one = true;
+            let at = tet.map(|corner| {
+                let own = self.shares().filter(|(node, _)| *node == corner);
+                own.map(|(_, weight)| weight).sum::<f32>()
+            });
+            // A point of a face is of two elements: one of them may have been removed.
+            if let Some(nodes) = body.tissue_at(*element, &at.map(f64::from)) {
+                return Bearer::Piece([0, 1, 2, 3].map(|corner| (nodes[corner], at[corner])));
+            }
+        }
+        match is_of_one {
+            true => Bearer::Gone,
+            false => Bearer::Nodes,
+        }
     }
 
     fn check(&self, index: usize, count: usize) -> Result<()> {

@@ -1,10 +1,13 @@
 //! Loads and prescribed nodes on cut bodies, against the reference solver with the same cuts.
+//!
+//! A force at a point of an element that a blade has parted is borne by the lip on which the point lies, and by none where that has been removed.
 
 use super::cuts::{liver, options, slit};
 use super::*;
 use tissue::mesh::{Boundary, Mesh};
 use tissue::solver::{ContactNode, Loads as TrueLoads, Solver, SolverOptions, SurfacePressure};
-use upt::{Error, Loads, Pressure, StepInput};
+use topology::Push;
+use upt::{Error, Loads, PointForce, Pressure, StepInput};
 
 /// A scene of the liver and the reference solver of the same body.
 pub(super) struct Both {
@@ -112,6 +115,7 @@ fn a_cut_body_sags_as_the_truth_does() {
                 pascal: f64::from(pascal),
                 walls: true,
             }],
+            ..TrueLoads::default()
         };
         found.push(both.step(input, &loads, &[]));
         assert!(both.scene.stats().min_det > 0.3, "{frame}");
@@ -189,6 +193,92 @@ fn loads_go_on_across_cuts_and_undo() {
     };
     assert!(matches!(scene.step(bad, None), Err(Error::Argument(_))));
     assert_eq!(scene.save().unwrap(), saved);
+}
+
+/// Forces at points of one lip of a slit, on the surface and inside, a millimetre from the blade: it opens, as the truth's does, and where the tissue is gone they are refused.
+#[test]
+fn forces_at_points_of_a_lip_open_the_slit() {
+    let mut both = Both::new();
+    both.cut(0, &slit(&both.scene, 3.0, 18.0));
+    let (at, normal) = site(&both.scene);
+    let across = normal.cross(normal.any_orthonormal_vector());
+    let place = |aside: f32, depth: f32| Vector::from(at) + across * (3.0 + aside) - normal * depth;
+    let places = [1.0, -1.0].map(|side| [0.5, 8.0].map(|depth| place(side, depth).to_array()));
+    both.scene
+        .attach_points(Some(places.as_flattened().as_flattened()))
+        .unwrap();
+    let model = std::sync::Arc::clone(both.scene.model());
+    let lips = places.map(|places| PointForce::at(&model, &places).unwrap());
+    let acting = |lip: usize, part: f32| {
+        let mut points = lips[lip].clone();
+        let way = across * [1.0, -1.0][lip];
+        (points.iter_mut()).for_each(|point| point.force = (way * 40.0 * part).to_array());
+        points
+    };
+    for lip in [0, 1] {
+        let mut squares = Vec::new();
+        for frame in 0..24 {
+            let points = acting(lip, (frame as f32 / 8.0).min(1.0));
+            let body = both.truth.body().unwrap();
+            let push = |point: &PointForce| {
+                let (weights, tets) = (point.weights.map(f64::from), &both.mesh.tets);
+                let element = tets.iter().position(|tet| *tet == point.nodes).unwrap();
+                Push {
+                    nodes: body.nodes_at(element as u32, &weights),
+                    weights,
+                    force: point.force.map(f64::from),
+                }
+            };
+            let loads = TrueLoads {
+                points: points.iter().map(push).collect(),
+                ..TrueLoads::default()
+            };
+            let input = with_points(&points);
+            squares.push(both.step(input, &loads, &[]).square);
+            assert!(both.scene.stats().min_det > 0.2, "{:?}", both.scene.stats());
+        }
+        let mut u = [0.0; 12];
+        both.scene.read_points(&mut u).unwrap();
+        // How far each point has gone the way that its lip goes when the slit opens.
+        let gone = [0, 1, 2, 3].map(|point: usize| {
+            let way = across * [1.0, -1.0][point / 2];
+            Vector::from_slice(&u[3 * point..][..3]).dot(way)
+        });
+        let (own, other) = (&gone[2 * lip..][..2], &gone[2 - 2 * lip..][..2]);
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        println!("{own:?} mm, the other lip {other:?}, {mean} mm², {squares:?}");
+        for (own, other) in own.iter().zip(other) {
+            assert!(*own > 0.5 && own + other > 0.25 * own, "{gone:?}");
+        }
+        assert!(mean < 0.005 && squares[23] < 0.002, "{squares:?}");
+    }
+    let mut u = [0.0; 12];
+    both.scene.read_points(&mut u).unwrap();
+    let there = Vector::from(places[1][0]) + Vector::from_slice(&u[6..9]);
+    let scene = &both.scene;
+    scene.remove(&ball(9.0, there.to_array()), 1e6).unwrap();
+    let saved = scene.save().unwrap();
+    let mut points = [acting(0, 0.0)[0], acting(1, 0.1)[0]];
+    match scene.step(with_points(&points), None) {
+        Err(Error::Argument(text)) => assert!(
+            text.contains("point_forces[1]") && text.contains("nothing left"),
+            "{text}"
+        ),
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(scene.save().unwrap(), saved);
+    points[1].force = [0.0; 3];
+    scene.step(with_points(&points), None).unwrap();
+}
+
+fn with_points(point_forces: &[PointForce]) -> StepInput<'_> {
+    StepInput {
+        loads: Loads {
+            point_forces,
+            ..Loads::default()
+        },
+        ..StepInput::default()
+    }
 }
 
 /// One lip is led aside by its nodes, copies among them, as the truth's is.

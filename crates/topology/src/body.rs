@@ -216,6 +216,16 @@ impl Body {
         found.1
     }
 
+    /// The nodes of the cell in which a point of an element lies, given by its weights on the element's corners; none where that has been removed.
+    pub fn tissue_at(&self, element: u32, at: &Weights) -> Option<[u32; 4]> {
+        let Some(cells) = self.cells.get(&element) else {
+            return Some(self.mesh.tet(element));
+        };
+        let depth = |cell: &&Cell| cell.material().depth(at);
+        let own = cells.iter().max_by(|a, b| depth(a).total_cmp(&depth(b)))?;
+        own.is_alive.then_some(own.nodes)
+    }
+
     /// Factor of an element's stiffness.
     pub fn stiffness(&self, element: u32) -> f32 {
         self.stiffness.get(&element).copied().unwrap_or(1.0)

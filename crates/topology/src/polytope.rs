@@ -28,6 +28,23 @@ pub struct Polytope {
     pub faces: Vec<(Side, Vec<Weights>)>,
 }
 
+/// Where a point of the element is in the coordinates of its three later corners.
+fn place(at: &Weights) -> Point {
+    [at[1], at[2], at[3]]
+}
+
+/// A corner of a face, and its normal.
+fn plane_of(face: &[Weights]) -> (Point, Point) {
+    let corner = place(&face[0]);
+    let mut sum = [0.0; 3];
+    for pair in face[1..].windows(2) {
+        let [a, b] = [0, 1].map(|end: usize| minus(place(&pair[end]), corner));
+        let part = cross(a, b);
+        (sum.iter_mut().zip(part)).for_each(|(sum, part)| *sum += 0.5 * part);
+    }
+    (corner, sum)
+}
+
 impl Polytope {
     /// The whole element.
     pub fn whole() -> Polytope {
@@ -75,22 +92,19 @@ impl Polytope {
 
     /// Whether a point of the element lies in it.
     pub fn holds(&self, at: &Weights) -> bool {
-        let place = |at: &Weights| -> Point { [at[1], at[2], at[3]] };
         self.faces.iter().all(|(_, points)| {
-            let corners: Vec<Point> = points.iter().map(place).collect();
-            dot(polygon::normal(&corners), minus(place(at), corners[0])) <= 1e-12
+            let (corner, normal) = plane_of(points);
+            dot(normal, minus(place(at), corner)) <= 1e-12
         })
     }
 
     /// How far inside of it a point of the element lies, in its coordinates: the least distance from its faces, negative outside.
     pub fn depth(&self, at: &Weights) -> f64 {
-        let place = |at: &Weights| -> Point { [at[1], at[2], at[3]] };
         let off = |points: &Vec<Weights>| {
-            let corners: Vec<Point> = points.iter().map(place).collect();
-            let normal = polygon::normal(&corners);
+            let (corner, normal) = plane_of(points);
             let length = dot(normal, normal).sqrt();
             match length > 0.0 {
-                true => dot(normal, minus(corners[0], place(at))) / length,
+                true => dot(normal, minus(corner, place(at))) / length,
                 false => f64::MAX,
             }
         };
