@@ -4,6 +4,8 @@
 //! inner step streams through, and the arithmetic intensity they imply. `UPT_BENCH_QUICK=1` shortens it;
 //! `UPT_FINE_MESH=FILE` adds the 151,201-node mesh.
 
+use criterion::{BenchmarkId, Criterion};
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tissue::contact::{ContactDomain, FACE_AREA_MM2};
@@ -26,15 +28,15 @@ struct Setting {
 
 fn main() {
     let quick = std::env::var("UPT_BENCH_QUICK").is_ok_and(|v| v == "1");
-    let time = Duration::from_secs(if quick { 2 } else { 8 });
-    let part = std::env::args().skip(1).find(|part| !part.starts_with('-'));
-    let wanted = |setting: &Setting| {
-        part.as_ref()
-            .is_none_or(|part| setting.label.contains(part))
-    };
-    for setting in settings().into_iter().filter(wanted) {
-        measure(&setting, time);
+    let mut criterion = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(if quick { 2 } else { 8 }))
+        .configure_from_args();
+    for setting in settings() {
+        measure(&mut criterion, &setting);
     }
+    criterion.final_summary();
 }
 
 fn settings() -> Vec<Setting> {
@@ -77,8 +79,7 @@ fn settings() -> Vec<Setting> {
     settings
 }
 
-/// Frames for this long after a half second of warming up, ten at least.
-fn measure(setting: &Setting, time: Duration) {
+fn measure(criterion: &mut Criterion, setting: &Setting) {
     let Setting {
         mesh,
         label,
@@ -97,38 +98,47 @@ fn measure(setting: &Setting, time: Duration) {
         .expect("a patch in the middle of the domain");
     let mut solver = Solver::new(mesh, Boundary::Fixed, options).expect("a valid mesh");
     let cost = solver.step_cost();
+    let seconds = RefCell::new(Vec::new());
+    let steps = RefCell::new(0);
     let variant = match pressure {
         Pressure::Element => "",
         Pressure::AverageNodal => ", average pressure",
     };
     let name = format!("{label}, K = {}{variant}", mesh.node_count());
-    let contact: Vec<ContactNode> = patch
-        .nodes
-        .iter()
-        .map(|node| ContactNode {
-            node: *node,
-            displacement: patch.inward.map(|v| (3.0 * v) as f32),
-        })
-        .collect();
-    let mut frame = || {
-        let start = Instant::now();
-        let report = solver
-            .step_frame(&contact, 0.05)
-            .expect("a gentle push is stable");
-        (start.elapsed().as_secs_f64(), report.inner_steps)
-    };
-    let start = Instant::now();
-    let mut steps = f64::from(frame().1);
-    while start.elapsed() < Duration::from_millis(500) {
-        frame();
-    }
-    let (start, mut seconds) = (Instant::now(), Vec::new());
-    while seconds.len() < 10 || start.elapsed() < time {
-        let (frame_s, inner_steps) = frame();
-        seconds.push(frame_s);
-        steps = f64::from(inner_steps);
+    criterion.benchmark_group("tled frame").bench_with_input(
+        BenchmarkId::new(&name, format!("{threads} threads")),
+        &(),
+        |bench, ()| {
+            bench.iter_custom(|iterations| {
+                let mut total = Duration::ZERO;
+                for _ in 0..iterations {
+                    let contact: Vec<ContactNode> = patch
+                        .nodes
+                        .iter()
+                        .map(|node| ContactNode {
+                            node: *node,
+                            displacement: patch.inward.map(|v| (3.0 * v) as f32),
+                        })
+                        .collect();
+                    let start = Instant::now();
+                    let report = solver
+                        .step_frame(&contact, 0.05)
+                        .expect("a gentle push is stable");
+                    let elapsed = start.elapsed();
+                    total += elapsed;
+                    seconds.borrow_mut().push(elapsed.as_secs_f64());
+                    *steps.borrow_mut() = report.inner_steps;
+                }
+                total
+            });
+        },
+    );
+    let seconds = seconds.into_inner();
+    if seconds.is_empty() {
+        return;
     }
     let median = gauge::median(seconds);
+    let steps = f64::from(steps.into_inner());
     let step = median / steps;
     println!(
         "{name}, {threads} threads: {:.1} ms a frame, {steps} inner steps of {:.1} us, {:.1} GFLOP/s, {:.2} MB a step ({:.1} GB/s), {:.2} flop a byte",
