@@ -674,7 +674,7 @@ typedef struct upt_corrections {
    */
   uint32_t count;
   /**
-   * No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
+   * No correction starts later than this in a step, µs, but the first of a step without tools; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
    */
   uint32_t budget_us;
   /**

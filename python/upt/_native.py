@@ -441,7 +441,7 @@ class Corrections(Record):
     count: int
     """With `UPT_CORRECTIONS_COUNT` 1 to 64; otherwise 0."""
     budget_us: int
-    """No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`."""
+    """No correction starts later than this in a step, µs, but the first of a step without tools; 0: no budget. Not with `UPT_CORRECTIONS_NONE`."""
     target_mm: float
     """Corrections stop once the estimated error is below this, mm; 0: no target. Only with `UPT_CORRECTIONS_COUNT` and `UPT_CORRECTIONS_AUTO`."""
 

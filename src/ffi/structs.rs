@@ -124,7 +124,7 @@ pub struct upt_corrections {
     pub mode: upt_corrections_mode,
     /// With `UPT_CORRECTIONS_COUNT` 1 to 64; otherwise 0.
     pub count: u32,
-    /// No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
+    /// No correction starts later than this in a step, µs, but the first of a step without tools; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.
     pub budget_us: u32,
     /// Corrections stop once the estimated error is below this, mm; 0: no target. Only with `UPT_CORRECTIONS_COUNT` and `UPT_CORRECTIONS_AUTO`.
     pub target_mm: f32,

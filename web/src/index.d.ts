@@ -89,7 +89,7 @@ export interface SceneOptions {
   corrections?: "recommended" | "none" | "auto" | number;
   /** Corrections stop below this estimated error, mm. */
   targetMm?: number;
-  /** No correction but the first starts later than this in a step, µs. */
+  /** No correction starts later than this in a step, µs, but the first of a step without tools. */
   budgetUs?: number;
   /** The flag UPT_FLAG_ERROR rises above this estimated error, mm. */
   errorLimitMm?: number;

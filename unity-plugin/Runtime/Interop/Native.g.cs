@@ -366,7 +366,7 @@ namespace Upt.Interop
         public upt_corrections_mode mode;
         /// <summary>With `UPT_CORRECTIONS_COUNT` 1 to 64; otherwise 0.</summary>
         public uint count;
-        /// <summary>No correction starts later than this in a step, µs, but the first; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.</summary>
+        /// <summary>No correction starts later than this in a step, µs, but the first of a step without tools; 0: no budget. Not with `UPT_CORRECTIONS_NONE`.</summary>
         public uint budget_us;
         /// <summary>Corrections stop once the estimated error is below this, mm; 0: no target. Only with `UPT_CORRECTIONS_COUNT` and `UPT_CORRECTIONS_AUTO`.</summary>
         public float target_mm;
