@@ -1,7 +1,7 @@
-//! The terms of laws in principal stretches, Ogden's and those that are two of its terms, by [`super::least_squares`].
+//! The terms of laws in principal stretches, Ogden's and those that are two of its terms, by `least_squares`.
 //!
 //! Unknown are `mu alpha / 2` of each term, at least 0, so that every term adds to the shear modulus and the law is elliptic, and the exponents up to
-//! [`BOUND`]: without a bound, terms degenerate to opposite ones that cancel.
+//! 30: without a bound, terms degenerate to opposite ones that cancel.
 
 use anyhow::{Result, bail};
 use elements::Ogden;
