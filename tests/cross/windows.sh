@@ -24,7 +24,17 @@ run() {
 prepare() {
   local system="$WINEPREFIX/drive_c/windows/system32"
   if [ ! -e "$system/bcryptprimitives.dll" ]; then
-    "$wine" wineboot -i >"$build/wineboot.log" 2>&1
+    # On a busy machine Wine's server now and then ends before the prefix is there.
+    local left=3
+    until "$wine" wineboot -i >"$build/wineboot.log" 2>&1; do
+      left=$((left - 1))
+      if [ "$left" = 0 ]; then
+        cat "$build/wineboot.log"
+        echo "Wine makes no prefix in $WINEPREFIX"
+        return 1
+      fi
+      sleep 5
+    done
     # Wine 8 has no bcryptprimitives.dll, which Rust's std takes random numbers from; in the test's prefix only.
     x86_64-w64-mingw32-gcc -O2 -shared -o "$system/bcryptprimitives.dll" "$root/tests/cross/process_prng.c" -ladvapi32
   fi
