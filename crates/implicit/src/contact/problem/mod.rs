@@ -116,7 +116,7 @@ impl ContactProblem {
         self.ways.lay_in_tissue = false;
         // Budgets come after it: how much a step may cost depends on whether a tool may lose its contact.
         self.enter(tools, ties, rest, start)?;
-        self.work = Work::of(self.ways.may_lose(), self.tied.work());
+        self.work = Work::of(self.ways.may_lose(), self.ways.has_leapt, self.tied.work());
         Ok(())
     }
 

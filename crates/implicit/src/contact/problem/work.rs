@@ -18,7 +18,7 @@ const LONGEST_SOLVES_WORK: u64 = 3 * SOLVES_WORK;
 /// What is left when solves begin to take fewer samples.
 const SHORT_OF_WORK: u64 = SOLVES_WORK / 2;
 
-/// Parts of the tools' ways in a step that has taken its work, or half of its time.
+/// Parts of the tools' ways in a step that has taken its work, or its time, or in a leap half of it.
 const LEAST_PARTS: u32 = 4;
 const LATE_PARTS: u32 = 2;
 
@@ -26,6 +26,8 @@ const LATE_PARTS: u32 = 2;
 #[derive(Debug, HeldBytes)]
 pub struct Work {
     solves: u64,
+    /// A tool was put elsewhere, and comes out of the tissue over a few steps.
+    leaps: bool,
     /// When the step's budget of time ends, when half of it is over, and when it would end a second time.
     until: Option<Instant>,
     half: Option<Instant>,
@@ -37,20 +39,22 @@ impl Work {
     pub fn new() -> Work {
         Work {
             solves: SOLVES_WORK,
+            leaps: false,
             until: None,
             half: None,
             twice: None,
         }
     }
 
-    /// Of a step whose tools may lose their contact; `more` for ties.
-    pub fn of(may_lose: bool, more: u64) -> Work {
+    /// Of a step whose tools may lose their contact, or of which one `leaps`; `more` for ties.
+    pub fn of(may_lose: bool, leaps: bool, more: u64) -> Work {
         let solves = match may_lose {
             true => SOLVES_WORK,
             false => LONGEST_SOLVES_WORK,
         };
         Work {
             solves: solves + more,
+            leaps,
             until: None,
             half: None,
             twice: None,
@@ -72,7 +76,7 @@ impl Work {
         if self.is_spent() {
             self.solves = 0;
         }
-        self.solves < SHORT_OF_WORK || self.is_half_over()
+        self.solves < SHORT_OF_WORK || self.is_hasty()
     }
 
     /// What a solve may take.
@@ -104,6 +108,11 @@ impl Work {
         self.half.is_some_and(|half| Instant::now() >= half)
     }
 
+    /// Whether it is a leap, half of whose budget of time is over: the rest of the step takes the least work.
+    fn is_hasty(&self) -> bool {
+        self.leaps && self.is_half_over()
+    }
+
     /// Whether the step's budget of time is over.
     pub fn is_late(&self) -> bool {
         self.until.is_some_and(|until| Instant::now() >= until)
@@ -114,9 +123,9 @@ impl Work {
         self.solves == 0 || self.is_late()
     }
 
-    /// The part of `parts` of the tools' ways to take after part `part`: the next, or one of `LEAST_PARTS` once the solves have taken their work, or half of their time.
+    /// The part of `parts` of the tools' ways to take after part `part`: the next, or one of `LEAST_PARTS` once the solves have taken their work or time, or in a leap half of it.
     pub fn next_part(&self, part: u32, parts: u32) -> u32 {
-        let stride = match self.is_spent() || self.is_half_over() {
+        let stride = match self.is_spent() || self.is_hasty() {
             true => parts.div_ceil(self.least_parts()),
             false => 1,
         };
@@ -125,7 +134,7 @@ impl Work {
 
     /// Parts of the tools' ways where there is little work or time left.
     pub(super) fn least_parts(&self) -> u32 {
-        if self.is_half_over() {
+        if self.is_late() || self.is_hasty() {
             LATE_PARTS
         } else {
             LEAST_PARTS
