@@ -14,7 +14,7 @@ use super::*;
 const MESH: &str = "mesh.safetensors";
 
 /// Gives the tetrahedra of a bundle numbers of laws, from the heights of their first corners over the body's. The manifest names the laws as `named` has them.
-fn mark(folder: &Path, number: impl Fn(f32) -> i32, laws: &Value, named: &Value) {
+pub fn mark(folder: &Path, number: impl Fn(f32) -> i32, laws: &Value, named: &Value) {
     let bytes = std::fs::read(folder.join(MESH)).unwrap();
     let file = SafeTensors::deserialize(&bytes).unwrap();
     let (_, header) = SafeTensors::read_metadata(&bytes).unwrap();
@@ -176,6 +176,25 @@ fn laws_that_cannot_be_are_named_with_their_region() {
         &other,
         &["region `lobe`: stiffness of tetrahedron 0", "in Pa"],
     );
+    // The material of the liver does not relax; where it does, no region may keep more.
+    let relaxing = |share: f64| json!([{"name": "lobe", "law": {"name": "neo-hookean"}, "relaxation": [{"share": share, "tau_s": 0.5}]}]);
+    let too_much = relaxing(1.5);
+    refused(
+        1,
+        &too_much,
+        &too_much,
+        &["region `lobe`: relaxation[0].share is 1.5"],
+    );
+    let folder = liver();
+    let mut manifest = fixture::manifest(folder.path());
+    manifest["material"]["relaxation"] = json!([{"share": 0.6, "tau_s": 0.05}]);
+    fixture::write_manifest(folder.path(), &mut manifest);
+    let less = relaxing(0.1);
+    mark(folder.path(), |_| 1, &less, &less);
+    let text = read(folder.path()).err().unwrap().to_string();
+    for word in ["region `lobe`: relaxation", "the tissue that relaxes least"] {
+        assert!(text.contains(word), "`{word}` in: {text}");
+    }
     let twice = json!([{"name": "lobe", "law": mooney()}, {"name": "lobe", "law": mooney()}]);
     refused(1, &twice, &twice, &["region `lobe`", "a name of its own"]);
     let unknown = json!([{"name": "lobe", "law": mooney(), "kappa": 1}]);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::cuts::{options, slit};
 use super::cuts_and_truth::{Operation, compare, errors, press};
+use super::regions::mark;
 use super::*;
 use fixture::{copy_of, relaxing_in, shipped};
 use serde_json::json;
@@ -74,6 +75,77 @@ fn steps_of_every_length_and_substeps_relax_alike() {
         }
         let fallen = fine[39] / fine[3];
         assert!((0.3..0.75).contains(&fallen), "{fallen}");
+    }
+}
+
+/// The liver with the numbers of two regions by height: 1 is `first`, 2 relaxes faster than the material.
+fn in_regions(
+    material: &serde_json::Value,
+    first: &serde_json::Value,
+    number: impl Fn(f32) -> i32,
+) -> (tempfile::TempDir, Arc<Model>) {
+    let folder = copy_of(shipped("liver-coarse"));
+    let law = json!({"name": "neo-hookean"});
+    let fast = json!([{"share": 0.4, "tau_s": 0.06}, {"share": 0.3, "tau_s": 0.8}]);
+    let laws = json!([
+        {"name": "lobe", "law": law, "relaxation": first},
+        {"name": "soft", "law": law, "relaxation": fast}
+    ]);
+    mark(folder.path(), number, &laws, &laws);
+    let material = (material.clone(), 1.0);
+    let model = relaxing_in(folder.path(), material, None, &ModelOptions::default());
+    (folder, model)
+}
+
+/// A region of the whole body: the material's own relaxation has the material's bits, and in a body that is elastic otherwise it relaxes as that does.
+#[test]
+fn a_region_relaxes_as_the_material_would() {
+    let (_folder, own) = open(None);
+    let wanted = held(&own, &with(10));
+    let branches = json!([{"share": 0.35, "tau_s": 0.12}, {"share": 0.32, "tau_s": 0.6}]);
+    let (_folder, same) = in_regions(&branches, &branches, |_| 1);
+    assert_eq!(held(&same, &with(10)), wanted);
+    let (_folder, alone) = in_regions(&json!([]), &branches, |_| 1);
+    let found = held(&alone, &with(10));
+    for at in [3, 6, 10, 20, 39] {
+        let off = found[at] / wanted[at] - 1.0;
+        let most = if at < 10 { 0.08 } else { 0.02 };
+        assert!(off.abs() < most, "frame {at}: {off}");
+    }
+}
+
+/// Elastic below, slow in the middle, fast where the tool is: two seconds and a half of a held press, with a slit, beside the solver; and a snapshot of it.
+#[test]
+fn regions_go_on_as_the_solvers_under_a_held_tool() {
+    let slow = json!([{"share": 0.3, "tau_s": 0.4}, {"share": 0.2, "tau_s": 5.0}]);
+    let number = |share: f32| i32::from(share < 0.4) + 2 * i32::from(share > 0.6);
+    let (folder, model) = in_regions(&slow, &json!([]), number);
+    let scene = Scene::new(Arc::clone(&model), &options()).unwrap();
+    let mut frames = press(&scene, 4.0, 54);
+    frames[40].0 = Some(Operation::Cut(slit(&scene, 6.0, 15.0)));
+    let mesh = folder.path().join("mesh.safetensors");
+    let found = compare(&model, mesh.to_str().unwrap(), &frames);
+    let (mean, force) = errors(&found[6..40]);
+    println!(
+        "{mean} mm², {force}; with a slit {:?}",
+        errors(&found[40..])
+    );
+    assert!(mean < 0.005 && force < 0.05, "{mean} mm², {force}");
+    let (mean, force) = errors(&found[40..]);
+    assert!(mean < 0.005 && force < 0.08, "{mean} mm², {force}");
+    assert!(found[39].2 < 0.9 * found[4].2, "{found:?}");
+    // A copy goes on with the same bits.
+    for (operation, tool) in &frames[..44] {
+        if let Some(Operation::Cut(poses)) = operation {
+            scene.cut(0, 2, poses).unwrap();
+        }
+        step(&scene, std::slice::from_ref(tool));
+    }
+    let other = Scene::new(Arc::clone(&model), &options()).unwrap();
+    other.restore(&scene.save().unwrap()).unwrap();
+    let tools = std::slice::from_ref(&frames[44].1);
+    for _ in 0..3 {
+        assert_eq!(bits(&step(&scene, tools)), bits(&step(&other, tools)));
     }
 }
 

@@ -361,9 +361,11 @@ impl Manifest {
         self.material.in_steps_of(self.dt_s)
     }
 
-    /// Whether its tissue relaxes.
+    /// Whether any of its tissue relaxes.
     pub fn relaxes(&self) -> bool {
-        !self.material.relaxation.is_empty()
+        let branches = |law: &serde_json::Value| law.get("relaxation")?.as_array().map(Vec::len);
+        let mut regions = (self.laws.as_array().into_iter().flatten()).filter_map(branches);
+        !self.material.relaxation.is_empty() || regions.any(|count| count > 0)
     }
 
     /// Length of step for a scene that presents and corrects as the bundle recommends, s: `dt_s` where it recommends none of its own.

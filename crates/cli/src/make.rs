@@ -89,9 +89,9 @@ pub struct Options {
     #[command(flatten)]
     sizes: tool_size::Arguments,
     /// Material that sets Young's modulus, density and damping: brain (if none is given), liver, kidney, heart or fat. With REGION= before it, a law as of
-    /// --law that a region has, and with @ behind that its density, kg/m³: one that --region or the mesh file names, or else a group of the input. May be repeated; where
-    /// regions overlap, the last one counts. All have the same Poisson's ratio, damping and relaxation.
-    #[arg(long, value_name = "NAME|REGION=LAW[@DENSITY]", allow_hyphen_values = true, value_parser = choice)]
+    /// --law that a region has, with @ behind that its density, kg/m³, and with ~ behind that its relaxation as of --relaxation, or none: one that --region or the mesh file
+    /// names, or else a group of the input. May be repeated; where regions overlap, the last one counts. All have the same Poisson's ratio and damping.
+    #[arg(long, value_name = "NAME|REGION=LAW[@DENSITY][~RELAXATION]", allow_hyphen_values = true, value_parser = choice)]
     material: Vec<Choice>,
     /// Region that --material gives a law: a name, `=` and a region as of --fixed. May be repeated; regions of one name are one.
     #[arg(long, value_name = "NAME=REGION", allow_hyphen_values = true)]

@@ -128,6 +128,7 @@ impl Partition {
         }
         let mut copy = Partition::empty_of(self)?;
         copy.relaxation = self.relaxation;
+        copy.relaxations = collected(self.relaxations.iter().copied())?;
         copy.chunks = chunks;
         copy.octahedra = self.octahedra.copied()?;
         copy.pairs = self.pairs.copied()?;

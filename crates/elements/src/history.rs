@@ -16,7 +16,7 @@ use crate::internal_forces::{ElementForces, Line, ParallelFor, Scratch, Shared};
 use crate::partition::Partition;
 use crate::relaxation::Relaxation;
 use crate::room::filled;
-use crate::stress_step::{SIX, StressStep};
+use crate::stress_step::{HistoryStep, SIX, StressStep};
 use lanes::WIDTH;
 use std::collections::TryReserveError;
 
@@ -27,6 +27,9 @@ pub struct StressHistory {
     values: [Vec<f32>; 3],
     /// Slots of the second row of forces.
     second: Vec<Line>,
+    /// By number of a law, for the step at hand.
+    steps: Vec<StressStep>,
+    /// Of the relaxation that has the most.
     branches: usize,
 }
 
@@ -36,7 +39,7 @@ impl StressHistory {
     /// # Errors
     /// No memory.
     pub fn new(partition: &Partition) -> Result<Self, TryReserveError> {
-        let branches = partition.relaxation.len();
+        let branches = partition.most_branches();
         let numbers = |batches: usize, tets: usize| batches * tets * (branches + 1) * SIX * WIDTH;
         Ok(Self {
             values: [
@@ -45,6 +48,7 @@ impl StressHistory {
                 filled(numbers(partition.singles.batches.len(), 1), 0.0)?,
             ],
             second: Vec::new(),
+            steps: Vec::new(),
             branches,
         })
     }
@@ -73,7 +77,7 @@ impl StressHistory {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let numbers: usize = self.values.iter().map(Vec::len).sum();
-        4 * numbers + size_of::<Line>() * self.second.len()
+        4 * numbers + size_of_val(self.second.as_slice()) + size_of_val(self.steps.as_slice())
     }
 
     /// The start of each kind's numbers, for [`crate::Kernels::relax`].
@@ -141,18 +145,46 @@ fn visit(
     }
 }
 
+impl Partition {
+    /// The relaxation of a number of a law.
+    pub fn relaxation_of(&self, number: u8) -> &Relaxation {
+        match usize::from(number).checked_sub(1) {
+            None => &self.relaxation,
+            Some(at) => &self.relaxations[at],
+        }
+    }
+
+    /// Branches of the relaxation that has the most.
+    pub fn most_branches(&self) -> usize {
+        let all = self.relaxations.iter().map(Relaxation::len);
+        all.fold(self.relaxation.len(), usize::max)
+    }
+
+    /// Whether any element relaxes.
+    pub fn relaxes(&self) -> bool {
+        self.most_branches() > 0
+    }
+
+    /// How the elements of a chunk go on.
+    pub fn stress_step(&self, number: u8, step: &HistoryStep) -> StressStep {
+        StressStep::new(self.relaxation_of(number), self.most_branches(), step)
+    }
+}
+
 impl ElementForces {
-    /// What the body remembers of its stresses at rest; none where its material does not relax.
+    /// What the body remembers of its stresses at rest; none where neither its material relaxes nor a region.
     ///
     /// # Errors
     /// No memory.
     pub fn stress_history(&self) -> Result<Option<StressHistory>, TryReserveError> {
-        if self.partition.relaxation.is_empty() {
+        if !self.partition.relaxes() {
             return Ok(None);
         }
         let mut history = StressHistory::new(&self.partition)?;
         let lines = self.partition.node_of_slot.len().div_ceil(4);
         history.second = filled(lines, Line::default())?;
+        let laws = 1 + self.partition.relaxations.len();
+        history.steps = filled(laws, StressStep::default())?;
         Ok(Some(history))
     }
 
@@ -175,7 +207,7 @@ impl ElementForces {
     }
 
     /// Takes the state `u` into the history and puts the rows of forces that it pushes the nodes with (µN) to `first` and, where it is asked for, `second`,
-    /// `[K,3]` each. Allocates nothing. The bits do not depend on the number of threads.
+    /// `[K,3]` each. Regions go on by their own relaxation. Allocates nothing. The bits do not depend on the number of threads.
     ///
     /// # Panics
     /// If a length is not `3 K`, or for the history of another body.
@@ -183,7 +215,7 @@ impl ElementForces {
         &self,
         displacement: &[f32],
         history: &mut StressHistory,
-        step: &StressStep,
+        step: &HistoryStep,
         scratch: &mut Scratch,
         (first, second): (&mut [f32], Option<&mut [f32]>),
         parallel: ParallelFor<'_>,
@@ -195,9 +227,13 @@ impl ElementForces {
             "out"
         );
         let count = out.iter().flatten().count();
-        assert_eq!(history.branches, step.count, "branches");
         let partition = &self.partition;
+        assert_eq!(history.branches, partition.most_branches(), "branches");
+        for (number, own) in (0..).zip(&mut history.steps) {
+            *own = partition.stress_step(number, step);
+        }
         let values = history.pointers().map(Shared);
+        let steps = &history.steps;
         let other = history.second.as_mut_ptr();
         let rows = [scratch.forces.as_mut_ptr(), other].map(|row| Shared(row.cast::<[f32; 4]>()));
         let places = Shared(scratch.positions.as_mut_ptr());
@@ -218,7 +254,10 @@ impl ElementForces {
                     std::ptr::write_bytes(*row, 0, chunk.slot_count());
                 }
                 let values = [0, 1, 2].map(|kind: usize| values[kind].at(0));
-                (self.kernels.relax)(partition, chunk, step, values, places, forces);
+                let step = &steps[usize::from(chunk.law)];
+                if !step.is_idle() {
+                    (self.kernels.relax)(partition, chunk, step, values, places, forces);
+                }
             }
         });
         let out = (out.each_mut()).map(|row| {

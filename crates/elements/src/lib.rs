@@ -55,7 +55,7 @@ pub use partition::{Chunk, Partition};
 pub use regions::{Laws, MOST_REGIONS, Region};
 pub use relaxation::{Branch, MOST_BRANCHES, Relaxation};
 pub use slots::{FLOPS_PER_NODE, PADDED};
-pub use stress_step::StressStep;
+pub use stress_step::{HistoryStep, StressStep};
 pub use subset::Subset;
 pub use tangent::tangent;
 pub use tetrahedra::Tetrahedra;

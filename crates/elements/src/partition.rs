@@ -72,6 +72,8 @@ pub struct Partition {
     pub laws: Vec<Law>,
     /// The material's.
     pub relaxation: Relaxation,
+    /// Of the body's regions.
+    pub relaxations: Vec<Relaxation>,
 }
 
 impl Partition {
@@ -139,6 +141,10 @@ impl Partition {
             moduli: material.moduli(),
             laws: collected(mesh.laws.regions.iter().map(|region| region.law))?,
             relaxation: material.relaxation,
+            relaxations: collected((mesh.laws.regions.iter()).map(|region| {
+                let own = region.relaxation;
+                own.unwrap_or(material.relaxation)
+            }))?,
         };
         for (chunk, leaf) in leaves().enumerate() {
             let is_own = |node: u32| owner[node as usize] == chunk as u32;
@@ -184,7 +190,7 @@ impl Partition {
     /// Whether batches have gradients.
     #[inline(always)]
     fn has_gradients(&self) -> bool {
-        self.takes_displacements() || !self.relaxation.is_empty()
+        self.takes_displacements() || self.relaxes()
     }
 
     /// Makes the zeros as long as the widest chunk, where a law takes displacements.
@@ -214,6 +220,7 @@ impl Partition {
             moduli: body.moduli,
             laws: collected(body.laws.iter().copied())?,
             relaxation: Relaxation::default(),
+            relaxations: Vec::new(),
         })
     }
 

@@ -2,11 +2,14 @@
 //!
 //! A region's law gives the shape of the stress; how stiff it is against the rest of the body is the stiffness of its tetrahedra. So at rest a body of several
 //! laws is one of several stiffnesses, and modes, linear response and compliance know nothing of laws. A region may have a density, too, which masses alone
-//! know. Poisson's ratio, damping and relaxation are the body's.
+//! know, and a relaxation: the tables of a step have the modulus `g(h)` of the body's material, and what a region's differs from that by is a load, as all that its
+//! elements remember is ([`crate::StressHistory`]). That is stable where a region keeps little more of its stress within a step than the material does. Poisson's
+//! ratio and damping are the body's.
 
 use crate::fault::MaterialError;
 use crate::laws::Law;
 use crate::material::{Material, Moduli};
+use crate::relaxation::Relaxation;
 use serde::{Deserialize, Serialize};
 
 /// Regions of a body at most.
@@ -15,6 +18,10 @@ pub const MOST_REGIONS: usize = 64;
 const MOST_DENSITY: f64 = 1e5;
 /// Part by which the stiffness of a tetrahedron may differ from that of a law which has its own shear modulus.
 const SAME_MODULUS: f64 = 1e-3;
+/// Lengths of steps at which the moduli `g(h)` of regions and material are compared, s.
+const STEPS_S: [f64; 4] = [0.002, 0.01, 0.05, 0.1];
+/// That of a region over the material's at most: what the rest is stressed by in a step is known one step late, and from 2 on would swing without end.
+const MOST_KEPT: f64 = 1.25;
 
 /// A region, as files have it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,6 +35,9 @@ pub struct Region {
     /// Density, kg/m³. Left out of files where it is the material's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density_kg_m3: Option<f64>,
+    /// Without branches the region is elastic. Left out of files where it is the material's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relaxation: Option<Relaxation>,
 }
 
 impl Region {
@@ -105,7 +115,8 @@ impl Laws<'_> {
                 return MaterialError::some(field, density.unwrap_or(0.0), wanted)
                     .map_or(Ok(()), Err);
             }
-            if let Some(fault) = region.law.fault() {
+            let relaxation = region.relaxation.and_then(|own| own.fault());
+            if let Some(fault) = region.law.fault().or(relaxation) {
                 return Err(MaterialError {
                     field: format!("region `{}`: {}", region.name, fault.field).into(),
                     ..fault
@@ -127,6 +138,35 @@ impl Laws<'_> {
         }
     }
 
+    /// Checks that no region keeps far more of its stress within a step than the material does.
+    fn check_relaxation(&self, material: &Material) -> Result<(), MaterialError> {
+        for region in self.regions {
+            let Some(relaxation) = region.relaxation else {
+                continue;
+            };
+            for h in STEPS_S {
+                let [own, body] = [relaxation.over(h), material.relaxation.over(h)];
+                if own <= MOST_KEPT * body {
+                    continue;
+                }
+                return Err(MaterialError {
+                    field: format!(
+                        "region `{}`: relaxation, part of the stress left by a step of {h} s,",
+                        region.name
+                    )
+                    .into(),
+                    value: own,
+                    wanted: format!(
+                        "at most {:.6}, {MOST_KEPT} times the material's: give the body the relaxation of the tissue that relaxes least, or none",
+                        MOST_KEPT * body
+                    )
+                    .into(),
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// The same, and that laws with a shear modulus of their own agree with the stiffness of their tetrahedra.
     ///
     /// # Errors
@@ -138,6 +178,7 @@ impl Laws<'_> {
         material: &Material,
     ) -> Result<(), MaterialError> {
         self.check(tets)?;
+        self.check_relaxation(material)?;
         for (tet, number) in self.of_tet.iter().enumerate() {
             let Some(region) = (usize::from(*number).checked_sub(1)).map(|at| &self.regions[at])
             else {

@@ -1,8 +1,8 @@
 //! A strain that is held relaxes as the material's Prony series, element by element and on every instruction set.
 
 use elements::{
-    Branch, ElementForces, Isa, Law, Material, MooneyRivlin, Ogden, Relaxation, StressStep,
-    Tetrahedron, VerondaWestmann, Yeoh,
+    Branch, ElementForces, HistoryStep, Isa, Law, Material, MooneyRivlin, Ogden, Region,
+    Relaxation, Tetrahedron, VerondaWestmann, Yeoh,
 };
 use tissue::mesh::{Mesh, box_phantom};
 
@@ -48,6 +48,14 @@ fn exact(mesh: &Mesh, material: &Material, u: &[f32]) -> Vec<f64> {
     out
 }
 
+fn when(since_s: f64, times_s: [f64; 2], g0: f64) -> HistoryStep {
+    HistoryStep {
+        since_s,
+        times_s,
+        g0,
+    }
+}
+
 /// On the threads of a pool chunks come in any order.
 fn backwards(count: usize, task: &(dyn Fn(usize, usize) + Sync)) {
     (0..count).rev().for_each(|chunk| task(chunk, 0));
@@ -79,7 +87,7 @@ fn a_held_strain_relaxes_as_the_series() {
             forces.evaluate(&u, &mut scratch, &mut elastic, &serial);
             let (mut now, mut next) = (vec![0.0; u.len()], vec![0.0; u.len()]);
             for step in 0..1200u32 {
-                let part = StressStep::new(&relaxation, h, [0.0, h], g0);
+                let part = when(h, [0.0, h], g0);
                 let parallel = if step % 2 == 0 { serial } else { backwards };
                 let out = (now.as_mut_slice(), Some(next.as_mut_slice()));
                 forces.relax(&u, &mut history, &part, &mut scratch, out, &parallel);
@@ -105,12 +113,12 @@ fn a_held_strain_relaxes_as_the_series() {
                 }
             }
             // The end of a step is the start of the next.
-            let part = StressStep::new(&relaxation, h, [0.0, h], g0);
+            let part = when(h, [0.0, h], g0);
             let ends = next.clone();
             let out = (now.as_mut_slice(), Some(next.as_mut_slice()));
             forces.relax(&u, &mut history, &part, &mut scratch, out, &serial);
             // One row alone is that row, and asking again changes nothing that is remembered.
-            let again = StressStep::new(&relaxation, 0.0, [0.0, h], g0);
+            let again = when(0.0, [0.0, h], g0);
             let (known, mut alone) = (history.values().clone(), vec![0.0; u.len()]);
             let out = (alone.as_mut_slice(), None);
             forces.relax(&u, &mut history, &again, &mut scratch, out, &serial);
@@ -127,7 +135,7 @@ fn order_and_threads_change_no_bit() {
     let mesh = box_phantom([30.0, 40.0, 50.0], [7, 9, 12]).unwrap();
     let material = materials()[0];
     let forces = ElementForces::new(mesh.tetrahedra(), &material, Isa::detect()).unwrap();
-    let step = StressStep::new(&material.relaxation, 0.05, [0.0, 0.05], 1.0);
+    let step = when(0.05, [0.0, 0.05], 1.0);
     let made = |parallel: elements::ParallelFor<'_>| {
         let mut scratch = forces.scratch(1).unwrap();
         let mut history = forces.stress_history().unwrap().unwrap();
@@ -196,4 +204,116 @@ fn constants_that_no_tissue_has_are_named() {
     );
     let branches = branches();
     assert_eq!(Relaxation::parse(&branches.to_string()), Ok(branches));
+}
+
+/// A block of three layers that is stretched and sheared alike everywhere: the material's, one with a series and a law of its own, one that is elastic.
+#[test]
+fn regions_relax_by_their_own_series() {
+    let mut mesh = box_phantom([30.0, 40.0, 50.0], [7, 9, 12]).unwrap();
+    let own = Relaxation::parse("0.3,0.1,0.3,2").unwrap();
+    let named = |name: &str, law, relaxation| Region {
+        name: name.into(),
+        law,
+        source: String::new(),
+        density_kg_m3: None,
+        relaxation: Some(relaxation),
+    };
+    mesh.regions = vec![
+        named("soft", materials()[1].law, own),
+        named("hard", Law::default(), Relaxation::default()),
+    ];
+    let layer = |tet: &[u32; 4]| (mesh.positions[tet[0] as usize][2] / 17.0) as u8;
+    mesh.region = mesh.tets.iter().map(layer).collect();
+    let u: Vec<f32> = (mesh.positions.iter())
+        .flat_map(|[x, y, z]| [0.1 * x + 0.05 * z, -0.06 * y, -0.04 * z])
+        .collect();
+    let h = 0.05;
+    for body in [branches(), Relaxation::default()] {
+        let material = Material {
+            relaxation: body,
+            ..Material::default()
+        };
+        mesh.check_laws(&material).unwrap();
+        let (g0, stepped) = (body.over(h), material.in_steps_of(h));
+        let series = [body, own, Relaxation::default()];
+        // Tetrahedron by tetrahedron, whole and without change of volume.
+        let shear = Material {
+            relaxation: branches(),
+            ..material
+        };
+        let softer = shear.in_steps_of(h);
+        let part = 1.0 - branches().over(h);
+        let want = |since: f64| {
+            let mut out = vec![0.0; u.len()];
+            for (at, &corners) in mesh.tets.iter().enumerate() {
+                let rest = corners.map(|node| mesh.positions[node as usize].map(f64::from));
+                let tet = Tetrahedron::new(corners, rest, 1.0);
+                let moved = corners.map(|n| [0, 1, 2].map(|k| f64::from(u[3 * n as usize + k])));
+                let state = tet.deformation(moved);
+                let [whole, less] = [material, softer].map(|material| {
+                    let moduli = mesh.laws().moduli_of(at, material.moduli());
+                    tet.forces(&state, moduli)
+                });
+                let relaxation = series[usize::from(mesh.region[at])];
+                let left: f64 = (relaxation.iter())
+                    .map(|branch| branch.gain(h) * branch.decay(since))
+                    .sum();
+                let lost = 1.0 - relaxation.lasting() - left;
+                for (node, corner) in corners.iter().enumerate() {
+                    for k in 0..3 {
+                        let shape = (whole[node][k] - less[node][k]) / part;
+                        out[3 * *corner as usize + k] += whole[node][k] - lost * shape;
+                    }
+                }
+            }
+            out
+        };
+        for isa in Isa::available() {
+            let forces = ElementForces::new(mesh.tetrahedra(), &stepped, isa).unwrap();
+            let mut scratch = forces.scratch(1).unwrap();
+            let mut history = forces.stress_history().unwrap().unwrap();
+            let (mut elastic, mut now) = (vec![0.0; u.len()], vec![0.0; u.len()]);
+            forces.evaluate(&u, &mut scratch, &mut elastic, &serial);
+            for step in 0..400u32 {
+                let out = (now.as_mut_slice(), None);
+                let part = when(h, [0.0, h], g0);
+                forces.relax(&u, &mut history, &part, &mut scratch, out, &backwards);
+                if ![0, 1, 20, 399].contains(&step) {
+                    continue;
+                }
+                let want = want(f64::from(step) * h);
+                let scale = want.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+                for (at, want) in want.iter().enumerate() {
+                    let off = (f64::from(elastic[at]) - f64::from(now[at]) - want).abs() / scale;
+                    assert!(off < 2e-4, "{isa:?}, step {step}, number {at}: {off:e}");
+                    // In an elastic body an elastic region is not touched.
+                    let is_hard = mesh.positions[at / 3][2] > 40.0;
+                    assert!(!is_hard || g0 < 1.0 || now[at] == 0.0, "number {at}");
+                }
+            }
+        }
+    }
+    // In tissue of which most is gone within a step nothing elastic is known in time.
+    let fast = Material {
+        relaxation: Relaxation::parse("0.6,0.01").unwrap(),
+        ..Material::default()
+    };
+    let error = mesh.check_laws(&fast).unwrap_err().to_string();
+    assert!(error.contains("region `soft`: relaxation"), "{error}");
+    let mut other = mesh.clone();
+    other.regions[0].relaxation = Some(
+        Relaxation::new([Branch {
+            share: 1.5,
+            tau_s: 1.0,
+        }])
+        .unwrap(),
+    );
+    let error = other
+        .check_laws(&Material::default())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("region `soft`: relaxation[0].share"),
+        "{error}"
+    );
 }

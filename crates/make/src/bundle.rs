@@ -80,7 +80,9 @@ pub fn assemble(
     if !material.law.is_default() {
         requires.insert(0, "law");
     }
-    if !material.relaxation.is_empty() {
+    let relaxes =
+        (mesh.regions.iter()).any(|own| own.relaxation.is_some_and(|own| !own.is_empty()));
+    if !material.relaxation.is_empty() || relaxes {
         requires.insert(0, "relaxation");
     }
     if !mesh.regions.is_empty() {

@@ -20,7 +20,7 @@ pub fn apply(
 ) -> Result<()> {
     let chosen: Vec<&LawRegion> = (options.material.iter())
         .filter_map(|choice| match choice {
-            Choice::Law(region, _) => Some(region),
+            Choice::Law(region, _) => Some(region.as_ref()),
             Choice::Numbers(_) => None,
         })
         .collect();
@@ -47,8 +47,13 @@ pub fn apply(
             None => String::new(),
             Some(density) => format!(" and {density} kg/m³"),
         };
+        let relaxation = match own.relaxation {
+            None => String::new(),
+            Some(own) if own.is_empty() => " and do not relax".into(),
+            Some(own) => format!(" and the relaxation {own}"),
+        };
         stage.decided(&format!(
-            "{} tetrahedra of region `{}` have the law {}{source}{density}",
+            "{} tetrahedra of region `{}` have the law {}{source}{density}{relaxation}",
             rows.len(),
             own.name,
             own.law

@@ -50,7 +50,7 @@ mod vibration;
 
 pub use fixed::Fixed;
 pub use gravity::{Gravity, gravity};
-pub use material::Choice;
+pub use material::{Choice, ELASTIC};
 pub use options::Options;
 pub use run::{Finished, Made, run};
 pub use yardstick::Watch;

@@ -4,13 +4,16 @@ use std::fmt;
 
 use elements::{Law, Region as LawRegion};
 
+/// What stands for the relaxation of a region that has none, in a body that relaxes.
+pub const ELASTIC: &str = "none";
+
 /// A value of `--material`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Choice {
     /// Young's modulus, density and damping of the body by name.
     Numbers(String),
     /// The law of a region, and how it was written.
-    Law(LawRegion, String),
+    Law(Box<LawRegion>, String),
 }
 
 impl fmt::Display for Choice {
@@ -19,9 +22,13 @@ impl fmt::Display for Choice {
             Self::Numbers(name) => to.write_str(name),
             Self::Law(region, law) => {
                 write!(to, "{}={law}", region.name)?;
-                match region.density_kg_m3 {
+                if let Some(density) = region.density_kg_m3 {
+                    write!(to, "@{density}")?;
+                }
+                match region.relaxation {
                     None => Ok(()),
-                    Some(density) => write!(to, "@{density}"),
+                    Some(own) if own.is_empty() => write!(to, "~{ELASTIC}"),
+                    Some(own) => write!(to, "~{own}"),
                 }
             }
         }

@@ -7,7 +7,7 @@
 
 use anyhow::{Context, Result};
 use elements::{
-    ElementForces, Isa, Law, Material, Ogden, Relaxation, Scratch, StressHistory, StressStep,
+    ElementForces, HistoryStep, Isa, Law, Material, Ogden, Relaxation, Scratch, StressHistory,
 };
 use tissue::mesh::regular_box;
 
@@ -108,7 +108,11 @@ impl Cube {
             .collect();
         let (mut own, mut kept) = (vec![0.0; u.len()], vec![0.0; u.len()]);
         let g0 = self.relaxation.over(self.step_s);
-        let step = StressStep::new(&self.relaxation, self.step_s, [0.0, self.step_s], g0);
+        let step = HistoryStep {
+            since_s: self.step_s,
+            times_s: [0.0, self.step_s],
+            g0,
+        };
         (self.forces).evaluate(&u, &mut self.scratch, &mut own, &serial);
         let out = (kept.as_mut_slice(), None);
         (self.forces).relax(&u, history, &step, &mut self.scratch, out, &serial);

@@ -212,7 +212,7 @@ fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
         "--region",
         "rind=plane:0,0,1,-12",
         "--material",
-        "rind=cortex",
+        "rind=cortex~0.25,0.05,0.4,0.5",
     ];
     let asked = [
         &law[..],
@@ -242,6 +242,10 @@ fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
         rind["source"].as_str().unwrap().starts_with("10.1016/"),
         "{rind}"
     );
+    let own: Vec<f64> = (rind["relaxation"].as_array().unwrap().iter())
+        .flat_map(|branch| ["share", "tau_s"].map(|key| branch[key].as_f64().unwrap()))
+        .collect();
+    assert_eq!(own, [0.25, 0.05, 0.4, 0.5]);
     for part in ["law", "laws", "relaxation"] {
         assert!(requires.iter().any(|name| name == part), "{requires:?}");
     }

@@ -25,6 +25,7 @@ pub fn blocks(laws: &[Law]) -> Mesh {
             law,
             source: String::new(),
             density_kg_m3: None,
+            relaxation: None,
         })
         .collect();
     mesh

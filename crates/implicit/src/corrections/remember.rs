@@ -1,6 +1,6 @@
 //! When relaxing tissue takes a state into what it remembers ([`super::relaxing`]).
 
-use elements::{Scratch, StressStep};
+use elements::{HistoryStep, Scratch};
 
 use super::Corrections;
 use super::history::History;
@@ -39,9 +39,12 @@ impl Relaxing {
         }
         (self.is_ready, self.has_start) = (true, start);
         let forces = &context.corrections.body.forces;
-        let relaxation = forces.relaxation();
-        let g0 = relaxation.over(context.corrections.time_step.integrator.step_s);
-        let step = StressStep::new(relaxation, self.since_s, [step_s, 0.0], g0);
+        let body_step_s = context.corrections.time_step.integrator.step_s;
+        let step = HistoryStep {
+            since_s: self.since_s,
+            times_s: [step_s, 0.0],
+            g0: forces.relaxation().over(body_step_s),
+        };
         let [from, to] = &mut self.pushes;
         let failed = std::sync::Mutex::new(None);
         forces.relax(

@@ -312,6 +312,7 @@ fn natural_modes_are_the_lowest_of_the_dense_problem() {
         law: elements::Law::default(),
         source: String::new(),
         density_kg_m3: Some(1850.0),
+        relaxation: None,
     }];
     let lame = Lame::from_young(3000.0, 0.45).unwrap();
     let stiffness = Stiffness::assemble(&mesh, &held, lame).unwrap();

@@ -5,7 +5,7 @@
 
 use super::SolverError;
 use super::fields::Node;
-use elements::{Chunk, Kernels, Partition, Relaxation, StressHistory, StressStep};
+use elements::{Chunk, HistoryStep, Kernels, Partition, StressHistory};
 
 /// Time between two updates, s.
 const EVERY_S: f64 = 5e-4;
@@ -13,7 +13,6 @@ const EVERY_S: f64 = 5e-4;
 /// See the module.
 #[derive(Clone)]
 pub(super) struct Relaxing {
-    relaxation: Relaxation,
     history: StressHistory,
     /// By slot, µN.
     force: Vec<Node>,
@@ -26,7 +25,6 @@ pub(super) struct Relaxing {
 pub(super) struct View {
     history: [*mut f32; 3],
     force: *mut Node,
-    relaxation: Relaxation,
     every: u32,
     dt: f64,
     since_s: f64,
@@ -35,12 +33,10 @@ pub(super) struct View {
 impl Relaxing {
     /// That of a body at rest; none where its material is elastic.
     pub fn new(partition: &Partition) -> Result<Option<Self>, SolverError> {
-        let relaxation = partition.relaxation;
-        if relaxation.is_empty() {
+        if !partition.relaxes() {
             return Ok(None);
         }
         Ok(Some(Self {
-            relaxation,
             history: StressHistory::new(partition)?,
             force: vec![Node::default(); partition.node_of_slot.len()],
             since_s: 0.0,
@@ -59,7 +55,6 @@ impl Relaxing {
         View {
             history: self.history.pointers(),
             force: self.force.as_mut_ptr(),
-            relaxation: self.relaxation,
             every: every(dt),
             dt,
             since_s: self.since_s,
@@ -109,11 +104,21 @@ impl View {
     ) {
         let held = f64::from(self.every) * self.dt;
         let since = if step == 1 { self.since_s } else { held };
-        let part = StressStep::new(&self.relaxation, since, [0.5 * held, 0.0], 1.0);
+        let part = partition.stress_step(
+            chunk.law,
+            &HistoryStep {
+                since_s: since,
+                times_s: [0.5 * held, 0.0],
+                g0: 1.0,
+            },
+        );
         // SAFETY: the caller's.
         unsafe {
             let force = self.force.add(chunk.first);
             std::ptr::write_bytes(force, 0, chunk.slot_count());
+            if part.is_idle() {
+                return;
+            }
             (kernels.relax)(
                 partition,
                 chunk,

@@ -126,6 +126,7 @@ fn regions_have_the_masses_of_their_density() {
         law: elements::Law::default(),
         source: String::new(),
         density_kg_m3: Some(1850.0),
+        relaxation: None,
     }];
     let masses = |mesh: &Mesh, density_kg_m3| {
         let options = SolverOptions {

@@ -1,6 +1,6 @@
 //! Regions with laws of their own: springs in series of two laws, the file, cuts.
 
-use elements::{Deformation, Law, Material, Moduli, Region, stress};
+use elements::{Deformation, Law, Material, Moduli, Region, Relaxation, stress};
 use tissue::mesh::{Boundary, Mesh, MeshError, regular_box};
 use tissue::solver::{ContactNode, Solver, SolverOptions};
 use tissue::statics;
@@ -15,6 +15,7 @@ fn named(name: &str, law: &str) -> Region {
         law: law.parse().unwrap(),
         source: "a test".into(),
         density_kg_m3: None,
+        relaxation: None,
     }
 }
 
@@ -165,6 +166,65 @@ fn two_laws_in_series_share_a_compression() {
         .flat_map(|(a, b)| (0..3).map(|k| f64::from(a[k]) - b[k]));
     let off = off.fold(0.0f64, |most, x| most.max(x.abs()));
     assert!(off < 0.02, "{off} mm from the equilibrium");
+}
+
+/// A region of the whole bar that relaxes has the bits of a material that does; the stress of a hold falls by what the series loses.
+#[test]
+fn a_region_relaxes_as_its_own_series() {
+    let branches = Relaxation::parse("0.4,0.1,0.3,1000").unwrap();
+    let mut mesh = regular_box([SIDE, SIDE, HEIGHT], [2, 2, 10]).unwrap();
+    let top = nodes(&mesh, HEIGHT);
+    mesh.fixed = nodes(&mesh, 0.0);
+    let held = |mesh: &Mesh, relaxation: Relaxation| {
+        let options = SolverOptions {
+            material: Material {
+                relaxation,
+                ..material()
+            },
+            ..SolverOptions::default()
+        };
+        let mut solver = Solver::new(mesh, Boundary::Fixed, options).unwrap();
+        let mut forces = Vec::new();
+        for frame in 1..=20 {
+            let part = (frame as f32 / 4.0).min(1.0);
+            let contact: Vec<ContactNode> = (top.iter())
+                .map(|&node| ContactNode {
+                    node,
+                    displacement: [0.0, 0.0, -1.6 * part],
+                })
+                .collect();
+            let report = solver.step_frame(&contact, 0.05).unwrap();
+            forces.push(report.reaction.iter().map(|f| f[2]).sum::<f32>());
+        }
+        forces
+    };
+    let elastic = held(&mesh, Relaxation::default());
+    let wanted = held(&mesh, branches);
+    mesh.region = vec![1; mesh.tets.len()];
+    mesh.regions = vec![Region {
+        relaxation: Some(branches),
+        ..named("muscle", "neo-hookean")
+    }];
+    let own = held(&mesh, Relaxation::default());
+    assert_eq!(own, wanted);
+    // 0.8 s after the rise the first branch has gone.
+    let left = own[19] / elastic[19];
+    assert!((left - 0.6).abs() < 0.03, "{left}");
+    // Half of the bar relaxes: in series the whole does by less.
+    for number in &mut mesh.region[..mesh.tets.len() / 2] {
+        *number = 0;
+    }
+    mesh.validate().unwrap();
+    let half = held(&mesh, Relaxation::default())[19] / elastic[19];
+    assert!((0.65..0.95).contains(&half), "{half}");
+    // The file keeps it, and the hash knows of it.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bar");
+    mesh.write(&path).unwrap();
+    let read = Mesh::read(&path).unwrap();
+    assert_eq!(read, mesh);
+    mesh.regions[0].relaxation = None;
+    assert_ne!(read.hash(), mesh.hash());
 }
 
 #[test]
