@@ -7,7 +7,7 @@ mod programmes;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use contact::{Shape, Vector};
 use serde::Serialize;
 use tissue::schemes::FRAME_S;
@@ -25,6 +25,8 @@ use programmes::{BALL_MM, Frame, Operation, PROGRAMMES, Programme, Site};
 const FRACTURE_ENERGY: f64 = 10.0;
 /// Near to the cut: this far from its place, mm.
 const NEAR_MM: f32 = 25.0;
+/// A ball this far aside is the same press, mm: what its force changes by is no error of anybody.
+const HARMLESS_MM: f32 = 0.05;
 
 /// A programme with a bundle.
 #[derive(Default, Serialize)]
@@ -41,6 +43,8 @@ struct Row {
     worst_mse: f64,
     /// Sums over frames and cases: what the force on the ball is off by, over what it is; and that of the blade.
     force_error: Option<f64>,
+    /// What the solver's own force changes by where the ball is [`HARMLESS_MM`] aside.
+    force_spread: Option<f64>,
     blade_error: Option<f64>,
     /// Volume that has left, of the library over the solver's.
     removed_ratio: Option<f64>,
@@ -59,6 +63,8 @@ struct Row {
 struct Found {
     errors: Vec<[f64; 2]>,
     force: Relative,
+    /// Between the solver and the solver with the ball [`HARMLESS_MM`] aside.
+    twin: Relative,
     blade: Relative,
     /// What new area takes, J/m².
     energy: f64,
@@ -71,6 +77,10 @@ struct Found {
 
 /// Measures and prints the table.
 pub fn report(asked: &Options) -> Result<ExitCode> {
+    let names = PROGRAMMES.map(|programme| programme.name);
+    if let Some(other) = (asked.programme.iter()).find(|name| !names.contains(&name.as_str())) {
+        bail!("--programme: `{other}` is none of {}", names.join(", "));
+    }
     beside::report(
         asked,
         "study report --cut",
@@ -78,7 +88,11 @@ pub fn report(asked: &Options) -> Result<ExitCode> {
         |subject| {
             let mut rows = Vec::new();
             for effort in &subject.efforts {
-                for programme in &PROGRAMMES {
+                let is_asked = |programme: &&Programme| {
+                    let names = &asked.programme;
+                    names.is_empty() || names.iter().any(|name| name == programme.name)
+                };
+                for programme in PROGRAMMES.iter().filter(is_asked) {
                     let mut found = Found {
                         energy: if programme.feels {
                             FRACTURE_ENERGY
@@ -92,7 +106,13 @@ pub fn report(asked: &Options) -> Result<ExitCode> {
                         eprintln!("{}: {name} {seed} of {}", subject.name, asked.cut);
                         let scene = subject.scene(*effort)?;
                         let site = Site::of(&scene, seed).context("the domain has no nodes")?;
-                        let frames = (programme.frames)(&site);
+                        let mut frames = match programme.elsewhere {
+                            Some(before) => {
+                                before(&site.another(&scene).context("no second site")?)
+                            }
+                            None => Vec::new(),
+                        };
+                        frames.extend((programme.frames)(&site));
                         case(&subject, &scene, (&site, &frames), &mut found)
                             .with_context(|| format!("{name} of seed {seed}"))?;
                     }
@@ -125,13 +145,19 @@ fn case(
         tear_off_mn: 0.0,
     };
     let mut ball = ball_at(BALL_MM, site.away())?;
-    truth.set_tools(mesh.samples(boundary), &[rigid], &[ball.pose])?;
+    truth.set_tools(
+        mesh.samples(boundary),
+        std::slice::from_ref(&rigid),
+        &[ball.pose],
+    )?;
     let near: Vec<usize> = (0..mesh.node_count())
         .filter(|node| site.distance(mesh.positions[*node]) < NEAR_MM)
         .collect();
+    let mut twin = Solver::new(mesh, boundary, subject.solver())?;
+    twin.set_tools(mesh.samples(boundary), &[rigid], &[ball.pose])?;
     for frame in frames {
         for operation in &frame.operations {
-            operate((subject, scene), &mut truth, operation, found)?;
+            operate((subject, scene), (&mut truth, &mut twin), operation, found)?;
         }
         ball.pose.translation = Vector::from(frame.ball.unwrap_or(site.away()));
         ball.mode = match frame.grasp {
@@ -143,6 +169,11 @@ fn case(
             grasp: frame.grasp,
         };
         let told = truth.step_tools(&[], &[pose], FRAME_S)?;
+        let mut aside = pose;
+        aside.pose.translation += Vector::splat(HARMLESS_MM / 3.0_f32.sqrt());
+        let other = twin.step_tools(&[], &[aside], FRAME_S)?;
+        let force = Vector::from(other.tools[0].force);
+        (found.twin).add(force.to_array(), Vector::from(told.tools[0].force));
         let mut wanted = vec![[0.0; 3]; truth.node_count()];
         truth.displacement(&mut wanted);
         let mut u = vec![0.0; 3 * scene.node_count()];
@@ -169,7 +200,7 @@ fn case(
 /// One operation on both bodies.
 fn operate(
     (subject, scene): (&Subject, &Scene),
-    truth: &mut Solver,
+    (truth, twin): (&mut Solver, &mut Solver),
     operation: &Operation,
     found: &mut Found,
 ) -> Result<()> {
@@ -182,6 +213,7 @@ fn operate(
             };
             let wide = edges.map(|edge| edge.map(|place| place.map(f64::from)).to_vec());
             let wanted = truth.cut_with(&blade, &Sweep::new(&wide)?, *stroke)?;
+            twin.cut_with(&blade, &Sweep::new(&wide)?, *stroke)?;
             start = Instant::now();
             let made = scene.cut_with(&blade, *stroke, 2, edges.as_flattened())?;
             let wanted = Vector::from(wanted.force().map(|x| -x as f32));
@@ -198,6 +230,7 @@ fn operate(
                 f64::from(-ball.body.nearest_at(&ball.pose, at).distance)
             };
             found.removed[1] += truth.remove(depth, f64::from(*most_mm3))?.removed_mm3;
+            twin.remove(depth, f64::from(*most_mm3))?;
             start = Instant::now();
             found.removed[0] += f64::from(scene.remove(&ball, *most_mm3)?.removed_mm3);
         }
@@ -216,11 +249,13 @@ fn operate(
                 .map(|(element, _)| element)
                 .collect();
             truth.scale_stiffness(&elements, *factor)?;
+            twin.scale_stiffness(&elements, *factor)?;
             start = Instant::now();
             scene.scale_stiffness(&elements, *factor)?;
         }
         Operation::Drop => {
             let wanted = truth.drop_fragments()?;
+            twin.drop_fragments()?;
             found.removed[1] += wanted.iter().map(|one| one.volume_mm3).sum::<f64>();
             start = Instant::now();
             let made = scene.drop_fragments()?;
@@ -250,6 +285,7 @@ impl Found {
             near_mse: median(all(1)),
             worst_mse: largest(all(0)),
             force_error: self.force.ratio(),
+            force_spread: self.twin.ratio(),
             blade_error: self.blade.ratio(),
             removed_ratio: (wanted > 0.0).then(|| removed / wanted),
             smallest_det: self.steps.smallest_det,
@@ -266,7 +302,7 @@ impl Found {
     }
 }
 
-const COLUMNS: [Column<Row>; 14] = [
+const COLUMNS: [Column<Row>; 15] = [
     ("bundle", |row| format!("`{}`", row.bundle)),
     ("programme", |row| format!("*{}*", row.programme)),
     ("k", |row| row.corrections.clone()),
@@ -277,6 +313,7 @@ const COLUMNS: [Column<Row>; 14] = [
     }),
     ("worst frame", |row| format!("{:.1e}", row.worst_mse)),
     ("force error: ball", |row| percent(row.force_error)),
+    ("the solver's own", |row| percent(row.force_spread)),
     ("blade", |row| percent(row.blade_error)),
     ("left, of the solver's", |row| percent(row.removed_ratio)),
     ("largest displacement, mm (the solver's)", |row| {

@@ -56,39 +56,53 @@ pub struct Site {
 pub struct Programme {
     pub name: &'static str,
     pub frames: fn(&Site) -> Vec<Frame>,
+    /// What is done at another place of the same body before.
+    pub elsewhere: Option<fn(&Site) -> Vec<Frame>>,
     /// Whether blades feel the tissue. What pushes a piece that they have cut free throws it away, by metres in the reference solver.
     pub feels: bool,
 }
 
-pub const PROGRAMMES: [Programme; 6] = [
+pub const PROGRAMMES: [Programme; 7] = [
     Programme {
         name: "incise",
         frames: incise,
+        elsewhere: None,
+        feels: true,
+    },
+    Programme {
+        name: "again",
+        frames: again,
+        elsewhere: Some(|site| slit(site, 1)),
         feels: true,
     },
     Programme {
         name: "flap",
         frames: flap,
+        elsewhere: None,
         feels: true,
     },
     Programme {
         name: "resect",
         frames: resect,
+        elsewhere: None,
         feels: true,
     },
     Programme {
         name: "biopsy",
         frames: biopsy,
+        elsewhere: None,
         feels: false,
     },
     Programme {
         name: "divide",
         frames: divide,
+        elsewhere: None,
         feels: false,
     },
     Programme {
         name: "coagulate",
         frames: coagulate,
+        elsewhere: None,
         feels: true,
     },
 ];
@@ -128,6 +142,13 @@ impl Site {
             along,
             across: normal.cross(along),
         })
+    }
+
+    /// Of the places of 40 seeds the farthest from this one.
+    pub fn another(&self, scene: &Scene) -> Option<Site> {
+        let sites = (1..=40).filter_map(|seed| Site::of(scene, seed));
+        let far = |site: &Site| (site.at - self.at).length();
+        sites.max_by(|a, b| far(a).total_cmp(&far(b)))
     }
 
     pub fn distance(&self, place: [f32; 3]) -> f32 {
@@ -176,17 +197,46 @@ fn go(frames: &mut Vec<Frame>, grasp: bool, count: usize, from: [f32; 3], to: [f
     }));
 }
 
-/// 24 mm long, 8 mm deep, in pieces of 2 mm; then a ball presses one lip 4 mm deep and 3 mm aside.
-fn incise(site: &Site) -> Vec<Frame> {
+/// The ball comes to a place from farther above it, slowly: where the tissue bulges it has not leapt into it.
+fn come(frames: &mut Vec<Frame>, site: &Site, over: [f32; 3]) {
+    let high = Vector::from(over) + site.normal * 8.0;
+    go(frames, false, 6, high.to_array(), over);
+}
+
+/// 24 mm long, 8 mm deep, in pieces of 2 mm.
+fn slit(site: &Site, stroke: u32) -> Vec<Frame> {
     let edge = |piece: i32| site.upright(2.0 * piece as f32 - 12.0, 0.0, 8.0);
-    let mut frames: Vec<Frame> = (0..12)
-        .map(|piece| cut(0, edge(piece), edge(piece + 1)))
-        .collect();
+    let pieces = (0..12).map(|piece| cut(stroke, edge(piece), edge(piece + 1)));
+    pieces.collect()
+}
+
+/// Beside a ball that presses 4 mm deep, 7 mm from it, a slit is cut.
+fn again(site: &Site) -> Vec<Frame> {
+    let mut frames = Vec::new();
+    let (over, deep) = (
+        site.place(0.0, 7.0, 5.0),
+        site.place(0.0, 7.0, BALL_MM - 4.0),
+    );
+    come(&mut frames, site, over);
+    go(&mut frames, false, 4, over, deep);
+    go(&mut frames, false, 6, deep, deep);
+    frames.extend(slit(site, 0).into_iter().map(|frame| Frame {
+        ball: Some(deep),
+        ..frame
+    }));
+    go(&mut frames, false, 6, deep, deep);
+    frames
+}
+
+/// A slit; then a ball presses one lip 4 mm deep and 3 mm aside.
+fn incise(site: &Site) -> Vec<Frame> {
+    let mut frames = slit(site, 0);
     let (over, deep) = (
         site.place(0.0, 4.5, 5.0),
         site.place(0.0, 4.5, BALL_MM - 4.0),
     );
     let aside = site.place(0.0, 7.5, BALL_MM - 4.0);
+    come(&mut frames, site, over);
     go(&mut frames, false, 4, over, deep);
     go(&mut frames, false, 3, deep, aside);
     go(&mut frames, false, 8, aside, aside);
@@ -251,6 +301,7 @@ fn resect(site: &Site) -> Vec<Frame> {
         site.place(0.0, 0.0, 4.0),
         site.place(0.0, 0.0, -9.0 + BALL_MM - 3.0),
     );
+    come(&mut frames, site, over);
     go(&mut frames, false, 8, over, deep);
     go(&mut frames, false, 8, deep, deep);
     frames
@@ -284,31 +335,36 @@ fn biopsy(site: &Site) -> Vec<Frame> {
     frames
 }
 
-/// A cap is cut off 6 mm below the surface and leaves; a ball presses the wall 3 mm deep.
+/// A wedge of 40 x 24 mm, 12 mm deep, is cut out and leaves; a ball presses what stays 3 mm deep, beside the edge. (No samples are on a wall that a
+/// blade leaves: nothing touches it.)
 fn divide(site: &Site) -> Vec<Frame> {
-    let edge = |aside: f32| {
-        [
-            site.place(-60.0, aside, -6.0),
-            site.place(60.0, aside, -6.0),
-        ]
+    // Two planes at 45 degrees that cross below, and two upright ones across their ends.
+    let slant = |from: f32, to: f32, part: f32| {
+        let aside = from + (to - from) * part;
+        [-24.0, 24.0].map(|ahead| site.place(ahead, aside, 4.0 - 20.0 * part))
     };
-    let mut frames: Vec<Frame> = (0..12)
-        .map(|at| {
-            cut(
-                0,
-                edge(10.0 * at as f32 - 60.0),
-                edge(10.0 * at as f32 - 50.0),
-            )
-        })
-        .collect();
+    let end = |ahead: f32, part: f32| site.upright(ahead, 32.0 * part - 4.0, 16.0);
+    let mut frames = Vec::new();
+    for at in 0..4 {
+        let parts = [0.25 * at as f32, 0.25 * at as f32 + 0.25];
+        let [from, to] = parts.map(|part| slant(-4.0, 16.0, part));
+        frames.push(cut(0, from, to));
+        let [from, to] = parts.map(|part| slant(28.0, 8.0, part));
+        frames.push(cut(1, from, to));
+    }
+    for (stroke, ahead) in [(2, -20.0), (3, 20.0)] {
+        frames.push(cut(stroke, end(ahead, 0.0), end(ahead, 0.5)));
+        frames.push(cut(stroke, end(ahead, 0.5), end(ahead, 1.0)));
+    }
     frames.push(Frame {
         operations: vec![Operation::Drop],
         ..Frame::default()
     });
     let (over, deep) = (
-        site.place(0.0, 0.0, 0.0),
-        site.place(0.0, 0.0, -6.0 + BALL_MM - 3.0),
+        site.place(0.0, -6.0, 5.0),
+        site.place(0.0, -6.0, BALL_MM - 3.0),
     );
+    come(&mut frames, site, over);
     go(&mut frames, false, 6, over, deep);
     go(&mut frames, false, 8, deep, deep);
     frames
@@ -321,9 +377,10 @@ fn coagulate(site: &Site) -> Vec<Frame> {
         site.place(0.0, 0.0, BALL_MM - 4.0),
     );
     let mut frames = Vec::new();
+    come(&mut frames, site, over);
     go(&mut frames, false, 4, over, deep);
     go(&mut frames, false, 6, deep, deep);
-    frames[6].operations.push(Operation::Stiffen {
+    frames[12].operations.push(Operation::Stiffen {
         at: site.place(0.0, 0.0, -4.0),
         radius: 10.0,
         factor: 4.0,

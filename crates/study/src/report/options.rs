@@ -74,6 +74,15 @@ pub struct Options {
     /// which runs here. --markdown replaces the part between the markers `study report --cut`.
     #[arg(long, value_name = "CASES", default_value_t = 0, hide_default_value = true, conflicts_with_all = ["trajectories", "data", "tools", "load", "hang"])]
     pub cut: usize,
+    /// With --cut: only these programmes. A table of some does not go into pages.
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_delimiter = ',',
+        requires = "cut",
+        conflicts_with = "markdown"
+    )]
+    pub programme: Vec<String>,
     /// Measure how a part of what holds the organ is led, let go under the gravity of --gravity and held again (*mobilise*), in the bundles of --bundle against the reference
     /// solver, which runs here; without a tool and with a ball. --markdown replaces the part between the markers `study report --mobilise`.
     #[arg(long, conflicts_with_all = ["trajectories", "data", "tools", "load", "hang", "cut"])]

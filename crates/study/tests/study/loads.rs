@@ -48,7 +48,15 @@ fn bodies_are_cut_as_the_solvers_are() {
     let names: Vec<&str> = (rows.iter())
         .map(|row| row["programme"].as_str().unwrap())
         .collect();
-    let all = ["incise", "flap", "resect", "biopsy", "divide", "coagulate"];
+    let all = [
+        "incise",
+        "again",
+        "flap",
+        "resect",
+        "biopsy",
+        "divide",
+        "coagulate",
+    ];
     assert_eq!(names, all);
     for row in rows {
         let number = |name: &str| row[name].as_f64();
