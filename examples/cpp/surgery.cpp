@@ -11,6 +11,7 @@ const float FRACTURE_ENERGY = 10; // J/m2
 const float STILL_MM = 0.02F;     // a blade that goes less far since its last step waits
 const float PUT_MM = 40;          // one that goes farther was put there
 const float RATE = 500;           // of an aspirator, mm3/s
+const std::uint32_t TORN = 4;     // elements that tear in a step, at the most
 const float HARDER = 4;           // what coagulation multiplies stiffness by, once an element
 
 // The point of the tool's axis, local y, so far from its middle.
@@ -64,7 +65,7 @@ void Surgery::begin(upt::Scene &scene) {
 }
 
 void Surgery::operate(upt::Scene &scene, Kind kind, const upt_instrument *tool, double step_s) {
-  const bool works = tool != nullptr && kind != Kind::press;
+  const bool works = tool != nullptr && (kind != Kind::press || limit > 0);
   force_ = {};
   waits_ = waits_ && works;
   if (waits_) {
@@ -84,7 +85,9 @@ void Surgery::operate(upt::Scene &scene, Kind kind, const upt_instrument *tool, 
     last_ = *tool;
   }
   upt_cut made = upt::make<upt_cut>();
-  if (kind == Kind::blade) {
+  if (kind == Kind::press) {
+    scene.tear(stroke_, limit, TORN, made);
+  } else if (kind == Kind::blade) {
     made = cut(scene, *tool);
   } else if (kind == Kind::aspirate) {
     upt_instrument ball = upt::sphere(tool->radius);

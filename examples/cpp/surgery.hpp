@@ -31,6 +31,8 @@ public:
   const upt::Surface &surface() const { return surface_; }
   // How often it has changed.
   std::int64_t changes() const { return changes_; }
+  // Tissue that a touching tool stretches beyond this tears; 0: none does.
+  float limit = 0;
   float area() const { return now_.area; }                 // that strokes have laid open, mm2
   float removed() const { return now_.removed; }           // that has left the body, mm3
   std::size_t hardened() const { return now_.hard_count; } // elements

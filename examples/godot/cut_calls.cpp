@@ -15,6 +15,19 @@ void work_as(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensi
       }));
 }
 
+/// Tissue that the tool stretches to so many times its length tears, where the tool presses or
+/// holds; 0: none does. A press that tore something is a stroke that `undo` takes back.
+void tear_at(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result) {
+  put(result, opened(instance, [&](Tissue &tissue) {
+        const double stretch = *static_cast<const double *>(arguments[0]);
+        if (stretch != 0 && !(stretch > 1)) {
+          throw std::runtime_error("tear_at: the stretch is " + std::to_string(stretch) +
+                                   "; above 1, or 0 for none");
+        }
+        tissue.tear_at(static_cast<float>(stretch));
+      }));
+}
+
 /// The body before the last stroke of a tool that changes it; false where there is none.
 void undo(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
   bool done = false;

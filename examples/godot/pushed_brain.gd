@@ -4,6 +4,7 @@
 #   --corrections=N, --target=MM, --substeps=N, --step=S
 #                       the tissue's properties of these names (default: what the bundle recommends)
 #   --cut               a blade cuts a slit of 30 mm in place of the spatula's push; --check takes it back
+#   --tear=STRETCH      what the spatula stretches beyond this tears; --check takes it back
 #   --site=X,Y,Z        the tool comes to the point of the surface that is nearest to this, mm, RAS (default: the lateral face of the brain)
 #   --bed               a ball hangs on the organ by a bed of ties in place of the spatula, and is drawn off after two seconds
 #   --lead=MM           the bundle's first support group goes up by so much in a second, and is let go after 1.5
@@ -98,6 +99,9 @@ func _ready() -> void:
 	tissue.hold(0.2, false, 0.0)
 	if options.has("cut"):
 		tissue.work_as(BLADE)
+	if options.has("tear") and (tissue.tear_at(0.5) or not tissue.tear_at(float(options["tear"]))):
+		finish("no limit of stretch: " + tissue.message())
+		return
 	if options.has("breathe") and not tissue.breathe(0.001 * float(options["breathe"]), BREATH):
 		finish("could not breathe: " + tissue.message())
 		return
@@ -207,6 +211,16 @@ func problem_of_cut() -> String:
 	return ""
 
 
+func problem_of_tear() -> String:
+	var area := tissue.cut_area()
+	if area < 1.0 or faces.size() == tissue.outside() or most_contacts == 0:
+		return "the spatula tore %.1f mm²; expected 1" % area
+	if not tissue.undo() or tissue.cut_area() != 0.0 or faces.size() == 0:
+		return "the tear is not taken back"
+	print("the spatula tore %.0f mm²" % area)
+	return ""
+
+
 func problem_of_bed() -> String:
 	var left := ties - tissue.torn()
 	if ties < 4 or early > 0 or left > 0:
@@ -232,6 +246,8 @@ func problem_of_all() -> String:
 		return problem_of_bed()
 	if options.has("cut"):
 		return problem_of_cut()
+	if options.has("tear"):
+		return problem_of_tear()
 	if most_contacts == 0:
 		return "the spatula never touched the tissue"
 	if largest < 0.005 or largest > 0.03:

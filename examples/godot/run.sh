@@ -102,6 +102,7 @@ with open(sys.argv[1], "w") as file:
 END
 check lead "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$build/supported" --lead=4 --seconds=2.2 --wait --check
 check cut "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --cut --seconds=1.3 --wait --check
+check tear "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --tear=1.1 --seconds=1.3 --wait --check
 refused() { # name message options...
   local name=$1 message=$2 status=0
   shift 2

@@ -305,6 +305,7 @@ static const GodotMethod METHODS[] = {
       {"rotation", T(QUATERNION)},
       {"let_go", T(BOOL)}}},
     {"work_as", work_as, T(BOOL), 1, {{"kind", T(INT)}}},
+    {"tear_at", tear_at, T(BOOL), 1, {{"stretch", T(FLOAT)}}},
     {"undo", undo, T(BOOL), 0, {}},
     {"changes", changes, T(INT), 0, {}},
     {"outside", outside, T(INT), 0, {}},

@@ -43,6 +43,7 @@ inline double real(GDExtensionConstTypePtr argument) {
 #define UPT_CALL(name)                                                                             \
   void name(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result)
 UPT_CALL(work_as);
+UPT_CALL(tear_at);
 UPT_CALL(undo);
 UPT_CALL(changes);
 UPT_CALL(outside);

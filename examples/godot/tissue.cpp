@@ -160,7 +160,7 @@ void Tissue::frame(double now) {
     follow(now, upt::span<const upt_instrument>(&framed, in_hand ? 1 : 0));
     return;
   }
-  if (!presses && !surgery_.has_begun()) {
+  if ((!presses || surgery_.limit > 0) && !surgery_.has_begun()) {
     if (amplitude_ != 0) {
       throw std::runtime_error(
           "what holds the organ moves: breathe(0, 1) before a tool changes it");
@@ -174,11 +174,13 @@ void Tissue::frame(double now) {
   } else {
     clock_.frame(scene_, now, tools, displacement_);
   }
-  if (taken_ != surgery_.changes()) {
+  const bool is_changed = taken_ != surgery_.changes();
+  if (is_changed) {
     take_surface();
   }
-  if (clock_.landed()) {
-    const std::size_t in_step = clock_.landed_instruments();
+  const std::size_t in_step = clock_.landed_instruments();
+  // Another body has made no step yet: the tool feels what it felt.
+  if (clock_.landed() && (!is_changed || in_step == 0)) {
     reading_ = in_step > 0 ? scene_.readings(in_step).front() : upt_instrument_reading{};
     if (in_step > 0 && !bed_.empty()) {
       const auto ties = scene_.tie_readings(bed_.size());

@@ -46,6 +46,8 @@ public:
   bool undo();
   // How often the surface has changed: `rest` and `faces` are others then.
   std::int64_t changes() const { return surgery_.changes(); }
+  // Tissue that a touching tool stretches beyond this tears from the next step on; 0: none does.
+  void tear_at(float stretch) { surgery_.limit = stretch; }
   // Of `faces`, those that were on the intact body's surface come first: so many indices.
   std::size_t outside() const { return surgery_.has_begun() ? outside_ : faces_.size(); }
   float area() const { return surgery_.area(); }       // that strokes have laid open, mm2

@@ -105,6 +105,17 @@ def a_blade_cuts_and_undo_heals():
         # The intact body steps on.
         steps = back.steps
         go(lambda done: None, lambda now: now.steps > steps + 3)
+        # A press tears nothing, unless that is asked for.
+        steps = back.steps
+        deep = go(lambda done: upright(top, 0, min(done, 12), radius=2), lambda now: now.steps > steps + 40)
+        assert deep.area == 0, deep
+        client.send(b'{"tear":1.2}')
+        torn = go(lambda done: upright(top, 0, 12, radius=2), lambda now: now.area > 0 and now.copies > 0)
+        assert torn.undos == 1, torn
+        go(lambda done: None, lambda now: True)
+        client.send(b'{"tear":0}')
+        client.send(b'{"undo":true}')
+        go(lambda done: None, lambda now: now.area == 0 and now.undos == 0)
 
 
 def the_mouse_operates(browser: Browser, bundle: Path, pictures: Path) -> None:

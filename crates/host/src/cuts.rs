@@ -56,6 +56,14 @@ impl Scene {
         Ok(out)
     }
 
+    /// `upt_scene_tear`.
+    pub fn tear(&mut self, stroke: u32, stretch: f32, most: u32) -> Result<ffi::upt_cut> {
+        let mut out = blank();
+        // SAFETY: `out` states its size.
+        check(unsafe { ffi::upt_scene_tear(self.handle, stroke, stretch, most, &mut out) })?;
+        Ok(out)
+    }
+
     /// `upt_scene_scale_stiffness`.
     pub fn scale_stiffness(&mut self, elements: &[u32], factor: f32) -> Result<ffi::upt_cut> {
         let mut out = blank();

@@ -9,6 +9,7 @@
 //! {"record": true}                   start a recording (false: end it)
 //! {"replay": true}                   from rest through the recording
 //! {"breathe": true}                  what holds the organ goes up and down (false: it does not), and a ball hangs on the organ
+//! {"tear": 1.5}                      tissue that a pressing tool stretches beyond this tears from now on (0: none does)
 //! {"undo": true}                     the body before the last stroke of a blade, aspirator or coagulator
 //! ```
 //!
@@ -78,6 +79,8 @@ pub enum Wish {
     Record(bool),
     Replay,
     Breathe(bool),
+    /// Tissue that a tool stretches beyond this tears; 0: none does.
+    Tear(f32),
     Undo,
 }
 
@@ -91,6 +94,7 @@ struct Message {
     record: Option<bool>,
     replay: Option<bool>,
     breathe: Option<bool>,
+    tear: Option<f32>,
     undo: Option<bool>,
 }
 
@@ -111,6 +115,7 @@ impl Wish {
             message.record.map(Wish::Record),
             message.replay.filter(|yes| *yes).map(|_| Wish::Replay),
             message.breathe.map(Wish::Breathe),
+            message.tear.map(Wish::Tear),
             message.undo.filter(|yes| *yes).map(|_| Wish::Undo),
         ];
         let mut given = given.into_iter().flatten();
@@ -119,10 +124,16 @@ impl Wish {
                 tool.check()?;
                 Ok(Wish::Tool(Some(tool), sequence))
             }
-            (Some(wish), None) => Ok(wish),
-            _ => {
-                Err("a message must hold one of tool, reset, record, replay, breathe, undo".into())
+            (Some(Wish::Tear(limit)), None) if limit != 0.0 && (limit <= 1.0 || limit.is_nan()) => {
+                Err(format!(
+                    "tear: {limit} is not a stretch: give more than 1, or 0 for none"
+                ))
             }
+            (Some(wish), None) => Ok(wish),
+            _ => Err(
+                "a message must hold one of tool, reset, record, replay, breathe, tear, undo"
+                    .into(),
+            ),
         }
     }
 }
@@ -198,6 +209,9 @@ mod tests {
         );
         assert_eq!(Wish::parse(r#"{"reset":true}"#), Ok(Wish::Reset));
         assert_eq!(Wish::parse(r#"{"undo":true}"#), Ok(Wish::Undo));
+        assert_eq!(Wish::parse(r#"{"tear":1.5}"#), Ok(Wish::Tear(1.5)));
+        assert_eq!(Wish::parse(r#"{"tear":0}"#), Ok(Wish::Tear(0.0)));
+        assert!(Wish::parse(r#"{"tear":0.9}"#).is_err_and(|why| why.contains("0.9")));
         let breathe = Wish::parse(r#"{"breathe":true}"#);
         assert_eq!(breathe, Ok(Wish::Breathe(true)));
         let blade = tool.replace(r#""friction":0.3"#, r#""friction":0.3,"kind":"blade""#);

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use anyhow::Result;
+use serde_json::json;
 use tungstenite::Message;
 use upt::ffi;
 
@@ -162,6 +163,7 @@ impl Session {
                         Breath::begin(&mut self.scene, self.framed, surface, &self.domain)?;
                 }
             }
+            Wish::Tear(limit) => self.surgery.limit = limit,
             Wish::Undo => {
                 self.pause();
                 self.surgery.undo(&mut self.scene)?;
@@ -204,17 +206,15 @@ impl Session {
     }
 
     /// What the page must know before the next frame.
-    pub fn told(&mut self) -> Result<Vec<Message>> {
+    pub fn told(&mut self) -> Vec<Message> {
         let mut messages = Vec::new();
         for (header, bytes) in self.news.drain(..) {
-            let text = serde_json::to_string(&serde_json::json!({ "surface": header }))?;
+            let text = json!({ "surface": header }).to_string();
             messages.extend([Message::text(text), Message::binary(bytes)]);
         }
-        if let Some(why) = self.surgery.refused.take() {
-            let text = serde_json::json!({ "refused": why }).to_string();
-            messages.push(Message::text(text));
-        }
-        Ok(messages)
+        let refused = self.surgery.refused.take();
+        messages.extend(refused.map(|why| Message::text(json!({ "refused": why }).to_string())));
+        messages
     }
 
     /// Takes the step that has finished, writes the frame of this moment, and submits the step that is due.

@@ -2,7 +2,7 @@
 //! surface.
 //!
 //! The tools' places are those of the tissue at rest that the mouse points at, as the pressing tool's are. The blade's edge goes up from the tool's tip along its axis; the aspirator is the
-//! ball at the tip, and so is what the coagulator reaches.
+//! ball at the tip, and so is what the coagulator reaches. Where the page has asked for it, tissue that a pressing tool stretches too far tears.
 
 use anyhow::Result;
 use upt::contact::PUT_MM;
@@ -20,6 +20,8 @@ const FRACTURE_ENERGY: f32 = 10.0;
 const STILL_MM: f32 = 0.02;
 /// The aspirator's, mm³/s.
 const RATE: f64 = 500.0;
+/// Elements that tear in a step, at the most.
+const TORN: u32 = 4;
 /// What coagulation multiplies stiffness by, once an element.
 const HARDER: f32 = 4.0;
 pub struct Surgery {
@@ -48,6 +50,8 @@ pub struct Surgery {
     /// What the tissue does to the blade, mN, and how long the last change took, ms.
     pub force: [f32; 3],
     pub change_ms: f32,
+    /// Tissue that a tool stretches beyond this tears; 0: none does.
+    pub limit: f32,
     /// Why the last operation was refused, until the page is told.
     pub refused: Option<String>,
 }
@@ -87,6 +91,7 @@ impl Surgery {
             account: Account::default(),
             force: [0.0; 3],
             change_ms: 0.0,
+            limit: 0.0,
             refused: None,
         })
     }
@@ -101,7 +106,8 @@ impl Surgery {
     /// # Errors
     /// What ends the conversation; an operation that the library refuses is told to the page.
     pub fn operate(&mut self, scene: &mut Scene, tool: Option<Tool>, step_s: f64) -> Result<()> {
-        let tool = tool.filter(|tool| tool.kind != Kind::Press);
+        let tears = self.limit > 0.0;
+        let tool = tool.filter(|tool| tears || tool.kind != Kind::Press);
         let last = std::mem::replace(&mut self.last, tool);
         self.force = [0.0; 3];
         self.waits &= tool.is_some();
@@ -121,7 +127,8 @@ impl Surgery {
         }
         let begun = std::time::Instant::now();
         let made = match tool.kind {
-            Kind::Press => Ok(None),
+            Kind::Press => (scene.tear(self.stroke, self.limit, TORN))
+                .map(|torn| Some(torn).filter(|torn| torn.is_changed != 0)),
             Kind::Blade => match goes_on {
                 Some((from, to)) => self.cut(scene, &from, &to),
                 None => Ok(None),

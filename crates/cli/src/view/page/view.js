@@ -35,6 +35,7 @@ const FLAGS = [
   "tool deep in the tissue",
   "contact not solved",
 ];
+const LIMIT = 1.4; // stretch at which tissue tears
 const REFUSED = 4000; // ms for which a refusal is shown
 
 const at = (id) => document.getElementById(id);
@@ -286,6 +287,11 @@ at("breathe").addEventListener("click", () => {
   const on = at("breathe").getAttribute("aria-pressed") !== "true";
   at("breathe").setAttribute("aria-pressed", String(on));
   say({ breathe: on });
+});
+at("tear").addEventListener("click", () => {
+  const on = at("tear").getAttribute("aria-pressed") !== "true";
+  at("tear").setAttribute("aria-pressed", String(on));
+  say({ tear: on ? LIMIT : 0 });
 });
 at("undo").addEventListener("click", () => say({ undo: true }));
 addEventListener("keydown", (event) => {
