@@ -159,3 +159,12 @@ def the_mouse_operates(browser: Browser, bundle: Path, pictures: Path) -> None:
             assert browser.run("return uptView.area") == (area if undos else 0)
         assert browser.run("return uptView.copies + uptView.removed") == 0
         browser.wait("document.getElementById('undo').disabled")
+        browser.click("[data-kind=press]")
+        browser.click("#tear")
+        browser.run("document.getElementById('radius').value = 1; document.getElementById('depth').value = 12")
+        browser.drag([(x - 10, y + 6), (x - 8, y + 8)], release=False)
+        browser.wait("uptView.area > 0 && uptView.undos === 1")
+        browser.screenshot(str(pictures / f"{bundle.name}-torn.png"))
+        browser.release()
+        browser.click("#undo")
+        browser.wait("uptView.area === 0")
