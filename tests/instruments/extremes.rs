@@ -3,7 +3,7 @@
 use contact::{Shape, Vector};
 use fixture::Draw;
 use upt::contact::{Mode, Tool};
-use upt::{Contact, Error, SceneOptions, flag};
+use upt::{Contact, Corrections, Error, SceneOptions, flag};
 
 use super::{ball, pressing, readings, site, step, with};
 use fixture::{model, plain, scene};
@@ -29,6 +29,39 @@ fn a_tool_that_starts_deep_inside_is_told_of_and_comes_out_on_its_own_side() {
     assert!(deepest[11] < 0.1, "{deepest:?}");
     let stats = scene.stats();
     assert!(stats.min_det > 0.0 && stats.flags & flag::DEEP == 0);
+}
+
+/// A microsecond is over before any iteration begins: what the linear response has wrong stays, and the estimate must not forget it while the tool is held.
+///
+/// Verifies REQ-037.
+#[test]
+fn what_no_iteration_corrected_keeps_its_estimated_error() {
+    let hurried = SceneOptions {
+        corrections: Corrections::Auto {
+            most: 64,
+            target_mm: 0.0,
+            budget_us: 1,
+        },
+        error_limit_mm: 0.01,
+        ..plain()
+    };
+    let hurried = scene(&model("tiny-corrected"), &hurried);
+    let settled = scene(&model("tiny-corrected"), &with(20));
+    for t in 1..=40 {
+        let tools = [pressing(
+            &hurried,
+            0.1 * f32::min(t as f32, 12.0),
+            Vector::ZERO,
+        )];
+        let (state, truth) = (step(&hurried, &tools), step(&settled, &tools));
+        let stats = hurried.stats();
+        let squares = state.iter().zip(&truth).map(|(a, b)| (a - b) * (a - b));
+        let error = (squares.sum::<f32>() / hurried.node_count() as f32).sqrt();
+        let told = stats.error_mm;
+        assert_eq!(stats.corrections, 0);
+        assert!(2.0 * told >= error, "step {t}: {told} mm told, {error} mm");
+        assert_eq!(stats.flags & flag::ERROR != 0, told > 0.01);
+    }
 }
 
 #[test]

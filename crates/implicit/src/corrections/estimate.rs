@@ -11,6 +11,9 @@ use super::motion::Motion;
 const KEPT: f32 = 0.7;
 /// The error far from the tools over what a smoothing there moves: it takes a small part of a smooth error (livers of 1,178 and 4,038 nodes).
 const FAR_ERROR: f32 = 150.0;
+/// What the last state left excuses so much of what further iterations would move at most, in targets: iterations take away the error of a state that none had
+/// corrected.
+const EXCUSED: f32 = 10.0;
 /// Iterations that a target does not end: what the first one moves says little of what the next would.
 const LEAST: u32 = 2;
 
@@ -19,8 +22,13 @@ impl Motion {
     /// what is left of the error of the state before, from which this one started.
     pub(super) fn estimate(&mut self, last: &Motion, report: &mut Report) {
         let far = FAR_ERROR * report.far_mm;
-        let own = libm::hypotf(libm::hypotf(report.remaining_mm, far), self.truncated_mm);
-        report.error_mm = libm::hypotf(own, KEPT * last.error_mm);
+        // Without an iteration all that a step goes may be wrong, and the error of the state before stays whole.
+        let (left, kept) = match report.uncorrected_mm {
+            Some(went) => (went, 1.0),
+            None => (report.remaining_mm, KEPT),
+        };
+        let own = libm::hypotf(libm::hypotf(left, far), self.truncated_mm);
+        report.error_mm = libm::hypotf(own, kept * last.error_mm);
         // What no number describes is told once, and not remembered.
         self.error_mm = match report.error_mm.is_finite() {
             true => report.error_mm,
@@ -31,8 +39,9 @@ impl Motion {
     /// Whether `iterations` have corrected the step after this state enough: the error is as small as was asked, or further iterations could not make it smaller, by
     /// what the last step left and left out.
     pub(super) fn suffices(&self, iterations: u32, remaining_mm: f32, enough: Enough) -> bool {
-        let rest = libm::hypotf(self.truncated_mm, KEPT * self.error_mm);
         let wanted = enough.error_mm;
+        let past = self.error_mm.min(EXCUSED * wanted);
+        let rest = libm::hypotf(self.truncated_mm, KEPT * past);
         wanted > 0.0
             && iterations >= LEAST
             && (libm::hypotf(remaining_mm, rest) < wanted

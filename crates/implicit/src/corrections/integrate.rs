@@ -87,7 +87,8 @@ impl ImplicitSolver {
     ) -> Result<()> {
         self.memory.begin();
         self.balance.load.clear();
-        self.finish(context, input, next)
+        self.finish(context, input, next)?;
+        Ok(())
     }
 
     /// The state being made is one that no equation of motion led to: without velocity.
@@ -111,13 +112,14 @@ impl ImplicitSolver {
         Ok(())
     }
 
-    /// Velocity and inertia at `next`, the end of the step from `last`, and what a step of this length leaves out.
+    /// Velocity and inertia at `next`, the end of the step from `last`, and what a step of this length leaves out; returns how far the step went, root mean square
+    /// over the nodes, mm.
     pub(super) fn finish(
         &mut self,
         context: SolverContext<'_>,
         input: &Input<'_>,
         next: &[f32],
-    ) -> Result<()> {
+    ) -> Result<f32> {
         let env = context.env();
         let (last, before) = (input.last, input.before);
         let Integrator {
@@ -128,7 +130,7 @@ impl ImplicitSolver {
         let (mass, motion) = (&env.body.mass_of_dof, &self.motion);
         let time = step_s as f32;
         // In pieces, each by one thread, whose sums are added in their order: the same bits for any number of threads.
-        let mut sums = passes::Sums::new(&mut self.balance.partial, next.len(), 2);
+        let mut sums = passes::Sums::new(&mut self.balance.partial, next.len(), 3);
         let parts = sums.parts();
         let own = &mut self.next;
         let outputs = [
@@ -152,16 +154,17 @@ impl ImplicitSolver {
                 inertia[i] = mass[i] * (a + alpha * v);
             }
             // SAFETY: these sums belong to this piece alone.
-            let sums = unsafe { parts.part(2 * piece, 2) };
+            let sums = unsafe { parts.part(3 * piece, 3) };
             // Second differences of displacement and velocity: zero for steady motion.
             // What BDF2 leaves out is of third order; these differences of known states are its measure, and [`BEND`] and [`JERK`] their weights.
             sums[0] = passes::sum_of_squares(next.len(), |i| next[i] - 2.0 * last[i] + before[i]);
             sums[1] = passes::sum_of_squares(next.len(), |i| {
                 time * (velocity[i] - 2.0 * velocity_before[i] + bdf2.known * known_before[i])
             });
+            sums[2] = passes::sum_of_squares(next.len(), |i| next[i] - last[i]);
         })?;
         let nodes = (next.len() / 3) as f64;
-        let [bend, jerk] = [0, 1].map(|at| (sums.total(at) / nodes).sqrt());
+        let [bend, jerk, went] = [0, 1, 2].map(|at| (sums.total(at) / nodes).sqrt());
         // Root mean square over the nodes, mm.
         let truncated = libm::hypot(BEND * bend, JERK * jerk);
         self.next.leave_load(&self.balance.load)?;
@@ -175,6 +178,6 @@ impl ImplicitSolver {
         };
         own.error_mm = 0.0;
         own.reaction.clear();
-        Ok(())
+        Ok(went as f32)
     }
 }

@@ -75,7 +75,7 @@ impl FieldStep<'_> {
         let result = self
             .iterate(&mut u, &mut g)
             .and_then(|()| self.solver.finish(context, input, &u))
-            .and_then(|()| self.take_reaction(&g));
+            .and_then(|_| self.take_reaction(&g));
         if result.is_ok() {
             next.copy_from_slice(&u);
         }

@@ -128,7 +128,10 @@ impl ToolStep<'_> {
         }
         // Back before anything else can fail: a solver without them could make no further step.
         (self.solver.fields.u, self.solver.fields.g) = (u, g);
-        result?;
+        let went = result?;
+        // What fell back is a linear response, too, or no answer to the tools at all.
+        let is_uncorrected = self.report.iterations == 0 || self.report.fell_back;
+        self.report.uncorrected_mm = is_uncorrected.then_some(went);
         self.solver.next.level = self.report.level as u32;
         self.solver.end(&mut self.report)?;
         self.problem.finish(state(self.input, next), breaks);
