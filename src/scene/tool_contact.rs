@@ -262,7 +262,13 @@ fn made<'a>(
     match problem {
         Some(problem) => Ok(problem),
         none => {
-            let make = || ContactProblem::new(body.model.samples()?, Arc::clone(&body.mesh));
+            let make = || {
+                ContactProblem::new(
+                    body.model.samples()?,
+                    Arc::clone(&body.mesh),
+                    body.model.isa,
+                )
+            };
             Ok(none.insert(Proven::new(make, WHAT)?))
         }
     }

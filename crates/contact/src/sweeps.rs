@@ -78,6 +78,16 @@ pub trait Rows {
 
     /// Three rows of a contact, `[3,3n]`.
     fn rows(&mut self, contact: usize) -> &[f32];
+
+    /// Adds to `shift [3n]` what a change of the force at a contact does, by its three rows.
+    fn add_shift(&mut self, contact: usize, change: Vector, shift: &mut [f32]) {
+        let (x, others) = self.rows(contact).split_at(shift.len());
+        let (y, z) = others.split_at(shift.len());
+        let rows = x.iter().zip(y).zip(z);
+        for (shift, ((x, y), z)) in shift.iter_mut().zip(rows) {
+            *shift = *shift + x * change.x + y * change.y + z * change.z;
+        }
+    }
 }
 
 /// All of it, row-major.
@@ -233,12 +243,7 @@ impl Sweeps {
             let change = block.frame * change;
             forces[i] = block.frame * wanted;
             self.work += 3 * self.shift.len() as u64;
-            let (x, others) = delassus.rows(i).split_at(self.shift.len());
-            let (y, z) = others.split_at(self.shift.len());
-            let rows = x.iter().zip(y).zip(z);
-            for (shift, ((x, y), z)) in self.shift.iter_mut().zip(rows) {
-                *shift = *shift + x * change.x + y * change.y + z * change.z;
-            }
+            delassus.add_shift(i, change, &mut self.shift);
         }
         largest
     }

@@ -19,6 +19,7 @@ pub mod decoder;
 pub mod encode;
 pub mod largest;
 mod math;
+pub mod nearest;
 pub mod parts;
 pub mod pool;
 pub mod project;
@@ -27,6 +28,7 @@ pub mod ragged;
 pub mod random;
 pub mod respond;
 pub mod rows;
+pub mod three_rows;
 pub mod vectors;
 
 // `derive(HeldBytes)` looks for it here.

@@ -95,7 +95,7 @@ impl Between {
             held[node as usize] = true;
         }
         let natural = corrections.space.natural_count();
-        let problem = ContactProblem::new(model.samples()?, Arc::clone(&model.mesh))?;
+        let problem = ContactProblem::new(model.samples()?, Arc::clone(&model.mesh), model.isa)?;
         Ok(Between {
             touched: TouchedTissue::new(prior, problem.surface.samples.nodes(), count)?,
             shown: None,

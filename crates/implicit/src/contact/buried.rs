@@ -6,6 +6,8 @@ use ::contact::{Body, Pose, Samples, Vector};
 
 use super::solid::Solid;
 use super::state::State;
+use crate::kernels::Isa;
+use crate::kernels::nearest::{AT_ONCE, nearest_nodes};
 use crate::memory::HeldBytes;
 
 /// A tool whose middle lies less deep than this, or than its half thickness, is in contact and not in the tissue, mm.
@@ -46,14 +48,14 @@ impl Buried {
     /// Where the tip of a thin tool has pierced the touchable surface, by no more than [`PIERCED_MM`]. Where that is in doubt, `is_inside` is asked
     /// whether a probe lies in the tissue.
     pub fn tip(
-        body: &Body,
-        pose: &Pose,
+        tool: (&Body, &Pose),
         samples: &Samples,
         state: State<'_>,
+        isa: Isa,
         is_inside: impl FnMut(Vector) -> bool,
     ) -> Option<Buried> {
         let least = 0.0;
-        deepest((body, pose), samples, state, least, is_inside)
+        deepest(tool, (samples, isa), state, least, is_inside)
             .filter(|buried| buried.depth < PIERCED_MM)
     }
 
@@ -63,10 +65,11 @@ impl Buried {
         (body, pose): (&Body, &Pose),
         (samples, has_lips): (&Samples, bool),
         mut solid: Solid<'_>,
+        isa: Isa,
     ) -> Option<Buried> {
         let least = LEAST_MM.min(body.size());
         let tool = (body, pose);
-        let buried = deepest(tool, samples, solid.state, least, |_| !has_lips)?;
+        let buried = deepest(tool, (samples, isa), solid.state, least, |_| !has_lips)?;
         let point = buried.point;
         let is_in = !solid.is_nearer(point, buried.depth)
             && solid.is_inside(point)
@@ -75,14 +78,11 @@ impl Buried {
     }
 }
 
-/// Probes whose nearest nodes are looked for at once.
-const AT_ONCE: usize = 8;
-
 /// The deepest of a tool's probes that lie more than `least` mm below the touchable surface. Of one that may lie beside a rim of that surface
 /// `is_inside` is asked.
 fn deepest(
     (body, pose): (&Body, &Pose),
-    samples: &Samples,
+    (samples, isa): (&Samples, Isa),
     state: State<'_>,
     least: f32,
     mut is_inside: impl FnMut(Vector) -> bool,
@@ -95,32 +95,24 @@ fn deepest(
     let mut probes = probes.map(|probe| pose.transform_point(probe));
     loop {
         // By axis, which vectors of the processor take.
-        let ([mut x, mut y, mut z], mut count) = ([[0.0f32; AT_ONCE]; 3], 0);
+        let (mut points, mut count) = ([[0.0f32; AT_ONCE]; 3], 0);
         for (at, probe) in (0..AT_ONCE).zip(&mut probes) {
-            [x[at], y[at], z[at]] = probe.to_array();
+            let probe = probe.to_array();
+            (0..3).for_each(|axis| points[axis][at] = probe[axis]);
             count += 1;
         }
         if count == 0 {
             return deepest;
         }
-        let (mut nearest, mut places) = ([f32::MAX; AT_ONCE], [0u32; AT_ONCE]);
-        for (place, node) in (0..).zip(samples.nodes()) {
-            let position = state.position(*node);
-            for at in 0..AT_ONCE {
-                let [dx, dy, dz] = [position.x - x[at], position.y - y[at], position.z - z[at]];
-                let distance = dx * dx + dy * dy + dz * dz;
-                let is_nearer = distance < nearest[at];
-                nearest[at] = if is_nearer { distance } else { nearest[at] };
-                places[at] = if is_nearer { place } else { places[at] };
-            }
-        }
+        let nodes = samples.nodes();
+        let nearest = nearest_nodes(isa, (state.rest, state.u), nodes, &points);
         for at in 0..count {
             let depth = deepest.map_or(least, |buried| buried.depth);
-            if nearest[at].sqrt() <= depth {
+            if nearest.squares[at].sqrt() <= depth {
                 continue;
             }
-            let point = Vector::new(x[at], y[at], z[at]);
-            if let Some((found, in_doubt)) = below(point, places[at], samples, state)
+            let point = Vector::from([0, 1, 2].map(|axis| points[axis][at]));
+            if let Some((found, in_doubt)) = below(point, nearest.places[at], samples, state)
                 && found.depth > depth
                 && (!in_doubt || is_inside(point))
             {
@@ -267,7 +259,8 @@ mod tests {
                 start: &[],
             };
             let pose = Pose::from_translation(at.into());
-            Buried::tip(&body, &pose, &samples, state, |_| false).map(|tip| (tip.depth, tip.out))
+            Buried::tip((&body, &pose), &samples, state, Isa::detect(), |_| false)
+                .map(|tip| (tip.depth, tip.out))
         };
         let (depth, out) = tip([12.0, 9.0, -1.5]).unwrap();
         assert!((depth - 1.5).abs() < 1e-5 && out.distance(Vector::Z) < 1e-5);

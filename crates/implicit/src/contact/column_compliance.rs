@@ -46,9 +46,9 @@ impl ColumnCompliance {
         3 * self.columns.len()
     }
 
-    /// Row of a column's first degree of freedom.
-    pub fn row_of(&self, column: u32) -> usize {
-        3 * self.columns.partition_point(|known| *known < column)
+    /// Place of a column among them.
+    pub fn place_of(&self, column: u32) -> usize {
+        self.columns.partition_point(|known| *known < column)
     }
 
     /// `count` rows of `A` from one on, `[count,3m]`.
@@ -236,10 +236,11 @@ impl ColumnCompliance {
     pub fn moved(&self, column: u32, dofs: &[u32], forces: &[f32]) -> Vector {
         let order = self.order();
         let mut moved = [0.0f32; 3];
+        let to = 3 * self.place_of(column);
         for (&dof, force) in dofs.iter().zip(forces) {
-            let from = self.row_of(dof / 3) + (dof % 3) as usize;
+            let from = 3 * self.place_of(dof / 3) + (dof % 3) as usize;
             for (axis, moved) in moved.iter_mut().enumerate() {
-                *moved += force * self.a[(self.row_of(column) + axis) * order + from];
+                *moved += force * self.a[(to + axis) * order + from];
             }
         }
         Vector::from(moved)

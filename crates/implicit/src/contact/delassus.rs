@@ -32,8 +32,9 @@ pub struct Delassus {
     was: Vec<u32>,
     /// By sample: its places among the columns.
     entries: Vec<Entries>,
-    /// `B A` of one sample `[3,3m]`.
+    /// `B A` of one sample `[3,3m]`, and its block at each column `[m]`, row-major.
     line: Vec<f32>,
+    blocks: Vec<Block>,
     /// The rows by their samples' numbers.
     order: Vec<u32>,
     /// Of which ties.
@@ -41,6 +42,9 @@ pub struct Delassus {
 }
 
 const NONE: u32 = u32::MAX;
+
+/// Nine numbers, row-major, and three that are nothing: registers have four.
+type Block = [f32; 12];
 
 impl Delassus {
     /// `W` of samples, `[3n,3n]`, row-major; read again only where they are others than those of the last call.
@@ -121,6 +125,7 @@ impl Delassus {
         memory::fit(&mut self.order, count, WHAT)?;
         memory::fit(&mut self.was, count, WHAT)?;
         memory::fit(&mut self.line, 3 * self.at.order(), WHAT)?;
+        memory::fit(&mut self.blocks, self.at.order() / 3, WHAT)?;
         let before = self.of_before.iter().enumerate();
         self.known
             .extend(before.map(|(at, &sample)| (sample, at as u32)));
@@ -130,7 +135,7 @@ impl Delassus {
         for sample in samples {
             let mut entries = Entries::default();
             for (column, weight) in compliance.entries(sample) {
-                let place = self.at.row_of(column) as u32;
+                let place = self.at.place_of(column) as u32;
                 entries.places[entries.count] = (place, weight);
                 entries.count += 1;
             }
@@ -162,15 +167,17 @@ impl Delassus {
         for at in first..count {
             let j = self.order[at] as usize;
             let was_j = self.was[j] as usize;
-            let mut block = [[0.0f32; 3]; 3];
+            let mut block = [0.0; 12];
             if self.was[i] != NONE && self.was[j] != NONE {
-                for (axis, row) in block.iter_mut().enumerate() {
+                for (axis, row) in block.chunks_exact_mut(3).take(3).enumerate() {
                     let from = (3 * was_i + axis) * size_before + 3 * was_j;
                     row.copy_from_slice(&self.w_before[from..from + 3]);
                 }
             } else {
                 self.add_block(i, j, &mut block);
             }
+            let [a, b, c, d, e, f, g, h, k, ..] = block;
+            let mut block = [[a, b, c], [d, e, f], [g, h, k]];
             // A diagonal block is symmetric but for rounding: its lower half decides, as in the mirrored blocks.
             if i == j {
                 block[0] = [block[0][0], block[1][0], block[2][0]];
@@ -185,24 +192,29 @@ impl Delassus {
     }
 
     /// Adds the block of the sample at `i`, whose `line` is made where it is not, with that at `j`.
-    fn add_block(&mut self, i: usize, j: usize, block: &mut [[f32; 3]; 3]) {
-        let order = self.at.order();
-        let (row, other) = (self.entries[i], self.entries[j]);
+    fn add_block(&mut self, i: usize, j: usize, block: &mut Block) {
+        let (row, other) = (&self.entries[i], &self.entries[j]);
         if self.line.is_empty() {
+            let order = self.at.order();
             self.line.resize(3 * order, 0.0);
             for (from, x) in &row.places[..row.count] {
-                let lines = self.at.rows(*from as usize, 3);
+                let lines = self.at.rows(3 * *from as usize, 3);
                 for (sum, value) in self.line.iter_mut().zip(lines) {
                     *sum += x * value;
                 }
             }
+            let (x, others) = self.line.split_at(order);
+            let (y, z) = others.split_at(order);
+            let [x, y, z] = [x, y, z].map(|line| line.as_chunks::<3>().0);
+            self.blocks.clear();
+            self.blocks.extend(x.iter().zip(y).zip(z).map(
+                |((&[a, b, c], &[d, e, f]), &[g, h, k])| [a, b, c, d, e, f, g, h, k, 0.0, 0.0, 0.0],
+            ));
         }
         for (to, y) in &other.places[..other.count] {
-            for (axis, row) in block.iter_mut().enumerate() {
-                let values = &self.line[axis * order + *to as usize..][..3];
-                for (sum, value) in row.iter_mut().zip(values) {
-                    *sum += y * value;
-                }
+            let values = &self.blocks[*to as usize];
+            for (sum, value) in block.iter_mut().zip(values) {
+                *sum += y * value;
             }
         }
     }

@@ -1,7 +1,7 @@
 //! `W` at any time after a step: the static one less what inertia holds back at that time, `W_k = W - G diag(lost) G^T` with the natural modes `G` at
 //! the samples. `W` and `G` are kept from call to call; a row is computed when it is asked for, by contacts whose force changes.
 
-use ::contact::Rows;
+use ::contact::{Rows, Vector};
 
 use super::compliance::{Compliance, WHAT};
 use super::delassus::Delassus;
@@ -9,6 +9,7 @@ use super::ties::Points;
 use crate::error::Result;
 use crate::kernels::Isa;
 use crate::kernels::respond::columns_f32;
+use crate::kernels::three_rows::add_three_rows;
 use crate::memory::{self, HeldBytes};
 
 /// The modes at the samples of the last call, and rows that were made since it.
@@ -133,6 +134,11 @@ impl Rows for At<'_> {
             }
         }
         &own.rows[place]
+    }
+
+    fn add_shift(&mut self, contact: usize, change: Vector, shift: &mut [f32]) {
+        let isa = self.isa;
+        add_three_rows(isa, self.rows(contact), change.to_array(), shift);
     }
 }
 

@@ -6,6 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use contact::Samples;
 use upt::contact::{Compliance, ContactProblem, ContactReport, State, Tool};
+use upt::kernels::Isa;
 
 use crate::bundle_folder::BundleFolder;
 use crate::prior_alone::PriorAlone;
@@ -30,7 +31,7 @@ impl Linear {
     ) -> Result<Self> {
         let prior = PriorAlone::new(bundle, decay, threads)?;
         Ok(Self {
-            problem: ContactProblem::new(samples.into(), prior.mesh().clone())?,
+            problem: ContactProblem::new(samples.into(), prior.mesh().clone(), Isa::detect())?,
             prior,
             rest: rest.as_flattened().to_vec(),
             state: vec![[0.0; 3]; rest.len()],

@@ -178,13 +178,14 @@ impl NearRows {
         for row in &mut self.rows {
             row.gap = moving.contact(row, part).gap;
         }
-        self.rows.sort_unstable_by(|a, b| {
+        // Which ones is all that is asked: they are sorted below.
+        self.rows.select_nth_unstable_by(most, |a, b| {
             let late = |row: &Row| match most < MOST_ROWS {
                 true => gauge.samples.at(row.sample).entries().count() > 1 || row.gap > SKIN_MM,
                 false => row.force == Vector::ZERO,
             };
             let order = late(a).cmp(&late(b)).then(a.gap.total_cmp(&b.gap));
-            order.then(a.sample.cmp(&b.sample))
+            order.then((a.sample, a.tool).cmp(&(b.sample, b.tool)))
         });
         let shed = self.rows[most..].iter();
         self.shed

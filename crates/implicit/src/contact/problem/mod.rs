@@ -32,6 +32,7 @@ use super::ties::{Placed, tie_of};
 use super::tool::{MAX_TOOLS, Mode, PUT_MM, Tool, ToolReading};
 use crate::bundle::Mesh;
 use crate::error::{Error, Result};
+use crate::kernels::Isa;
 use crate::memory::{self, HeldBytes};
 use depth::Depths;
 use forces::KeptForces;
@@ -72,15 +73,15 @@ impl ContactProblem {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>) -> Result<ContactProblem> {
+    pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>, isa: Isa) -> Result<ContactProblem> {
         Ok(ContactProblem {
-            surface: Surface::new(samples, mesh)?,
+            surface: Surface::new(samples, mesh, isa)?,
             ways: ToolWays::new()?,
             tied: TieSet::default(),
             past: Past::with_room(2 * MOST_ROWS)?,
             next: Past::with_room(2 * MOST_ROWS)?,
             near: NearRows::new()?,
-            solution: Solution::new(MAX_TOOLS)?,
+            solution: Solution::new(MAX_TOOLS, isa)?,
             kept: KeptForces::new()?,
             work: Work::new(),
             prescribed: Prescribed::new()?,

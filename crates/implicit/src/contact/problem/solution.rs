@@ -19,6 +19,8 @@ use crate::contact::rows::WHAT;
 use crate::contact::state::State;
 use crate::contact::ties::{NO_TOOL, Points};
 use crate::error::Result;
+use crate::kernels::Isa;
+use crate::kernels::three_rows::add_three_rows;
 use crate::memory::{self, HeldBytes};
 
 /// Multiplications of one linearisation at most: about half a millisecond.
@@ -102,10 +104,33 @@ impl Responses {
     }
 }
 
+/// All of `W`, whose rows are added up by the instructions of this processor.
+struct InLanes<'a> {
+    whole: Whole<'a>,
+    isa: Isa,
+}
+
+impl Rows for InLanes<'_> {
+    fn contacts(&self) -> usize {
+        self.whole.contacts()
+    }
+
+    fn rows(&mut self, contact: usize) -> &[f32] {
+        self.whole.rows(contact)
+    }
+
+    fn add_shift(&mut self, contact: usize, change: Vector, shift: &mut [f32]) {
+        let rows = self.whole.rows(contact);
+        add_three_rows(self.isa, rows, change.to_array(), shift);
+    }
+}
+
 /// See the module. `contacts` and `forces` are in the order of the rows.
 #[derive(HeldBytes)]
 pub struct Solution {
     pub responses: Responses,
+    #[held(skip)]
+    isa: Isa,
     sweeps: Sweeps,
     contacts: Vec<Contact>,
     pub(super) forces: Vec<Vector>,
@@ -127,12 +152,13 @@ impl Solution {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub(super) fn new(most_tools: usize) -> Result<Solution> {
+    pub(super) fn new(most_tools: usize, isa: Isa) -> Result<Solution> {
         let mut sweeps = Sweeps::default();
         memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
         let (room, dofs) = (2 * MOST_ROWS, 18 * MOST_ROWS);
         Ok(Solution {
             responses: Responses::default(),
+            isa,
             sweeps,
             contacts: memory::room(room, WHAT)?,
             forces: memory::room(room, WHAT)?,
@@ -188,7 +214,10 @@ impl Solution {
         let (mut whole, mut at);
         let w: &mut dyn Rows = match time {
             Time::StepEnd => {
-                whole = Whole::new(own.of(compliance, all, rows)?, rows.len());
+                whole = InLanes {
+                    whole: Whole::new(own.of(compliance, all, rows)?, rows.len()),
+                    isa: self.isa,
+                };
                 &mut whole
             }
             Time::Any => {

@@ -10,6 +10,7 @@ use crate::contact::rows::WHAT;
 use crate::contact::solid::{Sides, Solid};
 use crate::contact::state::State;
 use crate::error::Result;
+use crate::kernels::Isa;
 use crate::memory::{self, HeldBytes};
 
 /// See the module. The samples and the mesh are the model's; the rest is room for what is looked for.
@@ -25,12 +26,14 @@ pub struct Surface {
     pub(super) sides: Sides,
     /// The body has been cut open: no samples are on the walls of the cut, and the mesh's surface does not know them.
     has_lips: bool,
+    #[held(skip)]
+    isa: Isa,
 }
 
 impl Surface {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>) -> Result<Surface> {
+    pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>, isa: Isa) -> Result<Surface> {
         Ok(Surface {
             search: memory::tried(Search::with_room(&samples), WHAT)?,
             sides: Sides::new(mesh.node_count())?,
@@ -38,6 +41,7 @@ impl Surface {
                 .any(|node| mesh.surface_nodes.binary_search(node).is_err()),
             samples,
             mesh,
+            isa,
         })
     }
 
@@ -45,14 +49,14 @@ impl Surface {
     pub(super) fn buried(&mut self, body: &Body, pose: &Pose, state: State<'_>) -> Option<Buried> {
         let samples = (&*self.samples, self.has_lips);
         let solid = Solid::of(&self.mesh, state, &mut self.sides);
-        Buried::find((body, pose), samples, solid)
+        Buried::find((body, pose), samples, solid, self.isa)
     }
 
     /// Where the tip of a thin tool has pierced the surface.
     pub(super) fn tip(&mut self, body: &Body, pose: &Pose, state: State<'_>) -> Option<Buried> {
         let (samples, has_lips) = (&self.samples, self.has_lips);
         let mut solid = Solid::of(&self.mesh, state, &mut self.sides);
-        Buried::tip(body, pose, samples, state, |point| {
+        Buried::tip((body, pose), samples, state, self.isa, |point| {
             !has_lips && solid.is_inside(point)
         })
     }
