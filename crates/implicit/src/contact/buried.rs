@@ -106,13 +106,14 @@ fn deepest(
         }
         let nodes = samples.nodes();
         let nearest = nearest_nodes(isa, (state.rest, state.u), nodes, &points);
-        for at in 0..count {
+        let squares = nearest.squares.iter().zip(nearest.places).take(count);
+        for (at, (square, place)) in squares.enumerate() {
             let depth = deepest.map_or(least, |buried| buried.depth);
-            if nearest.squares[at].sqrt() <= depth {
+            if square.sqrt() <= depth {
                 continue;
             }
             let point = Vector::from([0, 1, 2].map(|axis| points[axis][at]));
-            if let Some((found, in_doubt)) = below(point, nearest.places[at], samples, state)
+            if let Some((found, in_doubt)) = below(point, place, samples, state)
                 && found.depth > depth
                 && (!in_doubt || is_inside(point))
             {

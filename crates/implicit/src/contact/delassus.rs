@@ -32,13 +32,19 @@ pub struct Delassus {
     was: Vec<u32>,
     /// By sample: its places among the columns.
     entries: Vec<Entries>,
-    /// `B A` of one sample `[3,3m]`, and its block at each column `[m]`, row-major.
-    line: Vec<f32>,
-    blocks: Vec<Block>,
+    /// Of one sample.
+    line: Line,
     /// The rows by their samples' numbers.
     order: Vec<u32>,
     /// Of which ties.
     ties: u64,
+}
+
+/// `B A` of one sample `[3,3m]`, and its block at each column `[m]`, row-major.
+#[derive(Debug, Default, HeldBytes)]
+struct Line {
+    rows: Vec<f32>,
+    blocks: Vec<Block>,
 }
 
 const NONE: u32 = u32::MAX;
@@ -124,8 +130,8 @@ impl Delassus {
         memory::fit(&mut self.w, 9 * count * count, WHAT)?;
         memory::fit(&mut self.order, count, WHAT)?;
         memory::fit(&mut self.was, count, WHAT)?;
-        memory::fit(&mut self.line, 3 * self.at.order(), WHAT)?;
-        memory::fit(&mut self.blocks, self.at.order() / 3, WHAT)?;
+        memory::fit(&mut self.line.rows, 3 * self.at.order(), WHAT)?;
+        memory::fit(&mut self.line.blocks, self.at.order() / 3, WHAT)?;
         let before = self.of_before.iter().enumerate();
         self.known
             .extend(before.map(|(at, &sample)| (sample, at as u32)));
@@ -163,7 +169,7 @@ impl Delassus {
         let (size, size_before) = (3 * count, 3 * self.of_before.len());
         let i = self.order[first] as usize;
         let was_i = self.was[i] as usize;
-        self.line.clear();
+        self.line.rows.clear();
         for at in first..count {
             let j = self.order[at] as usize;
             let was_j = self.was[j] as usize;
@@ -194,25 +200,25 @@ impl Delassus {
     /// Adds the block of the sample at `i`, whose `line` is made where it is not, with that at `j`.
     fn add_block(&mut self, i: usize, j: usize, block: &mut Block) {
         let (row, other) = (&self.entries[i], &self.entries[j]);
-        if self.line.is_empty() {
+        if self.line.rows.is_empty() {
             let order = self.at.order();
-            self.line.resize(3 * order, 0.0);
+            self.line.rows.resize(3 * order, 0.0);
             for (from, x) in &row.places[..row.count] {
                 let lines = self.at.rows(3 * *from as usize, 3);
-                for (sum, value) in self.line.iter_mut().zip(lines) {
+                for (sum, value) in self.line.rows.iter_mut().zip(lines) {
                     *sum += x * value;
                 }
             }
-            let (x, others) = self.line.split_at(order);
+            let (x, others) = self.line.rows.split_at(order);
             let (y, z) = others.split_at(order);
             let [x, y, z] = [x, y, z].map(|line| line.as_chunks::<3>().0);
-            self.blocks.clear();
-            self.blocks.extend(x.iter().zip(y).zip(z).map(
+            self.line.blocks.clear();
+            self.line.blocks.extend(x.iter().zip(y).zip(z).map(
                 |((&[a, b, c], &[d, e, f]), &[g, h, k])| [a, b, c, d, e, f, g, h, k, 0.0, 0.0, 0.0],
             ));
         }
         for (to, y) in &other.places[..other.count] {
-            let values = &self.blocks[*to as usize];
+            let values = &self.line.blocks[*to as usize];
             for (sum, value) in block.iter_mut().zip(values) {
                 *sum += y * value;
             }

@@ -37,7 +37,6 @@ pub use compliance::{Compliance, Tangent};
 pub use delassus::Delassus;
 pub use past::{Force, Past};
 pub use problem::ContactProblem;
-pub(crate) use problem::Work;
 pub use rows::{Pair, outward};
 pub use state::State;
 pub use state::vector;

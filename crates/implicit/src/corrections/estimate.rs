@@ -19,11 +19,17 @@ const LEAST: u32 = 2;
 
 impl Motion {
     /// The estimated error of this state, the one being made after `last`: what further iterations would move, what a step of this length leaves out, and
-    /// what is left of the error of the state before, from which this one started.
-    pub(super) fn estimate(&mut self, last: &Motion, report: &mut Report) {
+    /// what is left of the error of the state before, from which this one started. `uncorrected_mm` is how far a step went that no iteration corrected, root mean square
+    /// over the nodes.
+    pub(super) fn estimate(
+        &mut self,
+        last: &Motion,
+        report: &mut Report,
+        uncorrected_mm: Option<f32>,
+    ) {
         let far = FAR_ERROR * report.far_mm;
         // Without an iteration all that a step goes may be wrong, and the error of the state before stays whole.
-        let (left, kept) = match report.uncorrected_mm {
+        let (left, kept) = match uncorrected_mm {
             Some(went) => (went, 1.0),
             None => (report.remaining_mm, KEPT),
         };

@@ -60,7 +60,7 @@ impl FieldStep<'_> {
         if swings {
             self.finish_free(next);
         }
-        self.solver.end(&mut self.report)?;
+        self.solver.end(&mut self.report, None)?;
         Ok(self.report)
     }
 

@@ -25,8 +25,6 @@ pub struct Report {
     pub remaining_mm: f32,
     /// Root mean square over the nodes that the smoothing far from the tools has moved, mm: as much at least is out of balance there.
     pub far_mm: f32,
-    /// Root mean square over the nodes that a step went which no iteration corrected, mm; none where one did.
-    pub uncorrected_mm: Option<f32>,
     /// How far from the tools the next step iterates, a level of the near set.
     pub level: usize,
     /// Root mean square error over the nodes, estimated before the bundle's calibration, mm.

@@ -102,13 +102,13 @@ impl ImplicitSolver {
     }
 
     /// The end of a step after [`finish`](Self::finish): what fell back has followed no equation of motion, so it leaves no velocity behind; the state's error is estimated.
-    pub(super) fn end(&mut self, report: &mut Report) -> Result<()> {
+    pub(super) fn end(&mut self, report: &mut Report, uncorrected_mm: Option<f32>) -> Result<()> {
         if report.fell_back {
             self.stop_next();
             self.next.leave_load(&self.balance.load)?;
         }
         self.next.min_det = report.min_det;
-        self.next.estimate(&self.motion, report);
+        self.next.estimate(&self.motion, report, uncorrected_mm);
         Ok(())
     }
 

@@ -81,7 +81,7 @@ impl FieldStep<'_> {
         }
         (self.solver.fields.u, self.solver.fields.g) = (u, g);
         result?;
-        self.solver.end(&mut self.report)?;
+        self.solver.end(&mut self.report, None)?;
         Ok(self.report)
     }
 

@@ -101,6 +101,11 @@ impl ImplicitSolver {
         next: &mut [f32],
     ) -> Result<Report> {
         problem.work.end_by(input.enough.until);
+        // From an inverted state a step begins at rest, and so would each of its parts.
+        let lost = self.motion.min_det < SMALLEST_DET;
+        if lost {
+            problem.work.bound();
+        }
         let _awake = context.pool.keep_awake();
         if let Some(relaxing) = &mut self.relaxing {
             relaxing.remember(context, input, false, &mut self.balance.scratch)?;
@@ -108,15 +113,15 @@ impl ImplicitSolver {
         let Some((substeps, substepper)) = substeps else {
             return make_loaded(self, context, input, problem, next, true);
         };
-        // From an inverted state a step begins at rest, and so would each of its parts.
-        let lost = self.motion.min_det < SMALLEST_DET;
-        if substeps.helps(self.motion.truncated_mm) && !lost {
+        // Nor does a step help in parts whose work is bounded as a whole.
+        let is_bounded = problem.work.is_bounded();
+        if substeps.helps(self.motion.truncated_mm) && !lost && !is_bounded {
             return substeps.drive(self, context, input, problem, substepper, next);
         }
         let whole = make_loaded(self, context, input, problem, next, true)?;
         // Where the iterations have lost the contact they would lose it again.
         let helps = substeps.helps(libm::hypotf(self.next.truncated_mm, whole.remaining_mm));
-        if whole.fell_back || !helps {
+        if whole.fell_back || !helps || is_bounded {
             return Ok(whole);
         }
         // A tool that the whole step stopped on its way is where the host has put it again.

@@ -50,6 +50,9 @@ const MORE_PRESSES: u32 = 6;
 const MORE_EVALUATIONS: u32 = 6;
 const EVALUATIONS: u32 = 2;
 
+/// Work of an evaluation for each node, in multiplications of contact solves.
+const EVALUATION_WORK: u64 = 200;
+
 /// Parts of the tools' way after which a guess that inverts elements is improved by an iteration, at most.
 const MOST_PARTS: u32 = 4;
 
@@ -131,9 +134,9 @@ impl ToolStep<'_> {
         let went = result?;
         // What fell back is a linear response, too, or no answer to the tools at all.
         let is_uncorrected = self.report.iterations == 0 || self.report.fell_back;
-        self.report.uncorrected_mm = is_uncorrected.then_some(went);
+        let uncorrected = is_uncorrected.then_some(went);
         self.solver.next.level = self.report.level as u32;
-        self.solver.end(&mut self.report)?;
+        self.solver.end(&mut self.report, uncorrected)?;
         self.problem.finish(state(self.input, next), breaks);
         Ok(())
     }
@@ -184,6 +187,8 @@ impl ToolStep<'_> {
 
     /// `F(u)` and det F of a state that no iteration led to.
     fn evaluate(&mut self, at: &mut Iterate<'_>) -> Result<()> {
+        let nodes = at.u.len() as u64 / 3;
+        self.problem.work.take_whole(EVALUATION_WORK * nodes);
         at.evaluate(
             &mut self.solver.balance,
             self.context,
@@ -227,8 +232,8 @@ impl ToolStep<'_> {
                 let due = part * iterated / parts > last * iterated / parts;
                 let spent = self.problem.work.is_spent()
                     || is_spent(self.input, self.problem, &self.report, 1);
-                let spent = spent || self.problem.work.is_half_over();
-                if due && part < parts && !spent {
+                if due && part < parts && !spent && !self.problem.work.spares(self.must_be_sound())
+                {
                     self.solver.settle(env, at.u)?;
                     self.evaluate(at)?;
                     if at.det > SMALLEST_DET {
@@ -246,6 +251,7 @@ impl ToolStep<'_> {
             if at.det > least
                 || iterated >= MOST_PARTS
                 || self.problem.work.is_spent()
+                || self.problem.work.spares(self.must_be_sound())
                 || is_spent(self.input, self.problem, &self.report, 1)
             {
                 return Ok(());

@@ -77,8 +77,11 @@ pub struct Change<'a> {
 }
 
 /// How the rows move under their forces.
-#[derive(Default, HeldBytes)]
+#[derive(HeldBytes)]
 pub struct Responses {
+    /// By which rows are added up.
+    #[held(skip)]
+    isa: Isa,
     /// Of tissue at rest, at the step's length.
     pub(super) rest: Delassus,
     /// Of deformed tissue: kept apart, so that the tissue at rest is not read again after each look at the deformed one.
@@ -88,6 +91,15 @@ pub struct Responses {
 }
 
 impl Responses {
+    fn new(isa: Isa) -> Responses {
+        Responses {
+            isa,
+            rest: Delassus::default(),
+            tangent: Delassus::default(),
+            inertial: InertialCompliance::default(),
+        }
+    }
+
     /// Exchanges the responses of the contact for those of another length of step, on which they depend.
     pub fn exchange(&mut self, other: &mut Delassus) {
         std::mem::swap(&mut self.rest, other);
@@ -129,8 +141,6 @@ impl Rows for InLanes<'_> {
 #[derive(HeldBytes)]
 pub struct Solution {
     pub responses: Responses,
-    #[held(skip)]
-    isa: Isa,
     sweeps: Sweeps,
     contacts: Vec<Contact>,
     pub(super) forces: Vec<Vector>,
@@ -157,8 +167,7 @@ impl Solution {
         memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
         let (room, dofs) = (2 * MOST_ROWS, 18 * MOST_ROWS);
         Ok(Solution {
-            responses: Responses::default(),
-            isa,
+            responses: Responses::new(isa),
             sweeps,
             contacts: memory::room(room, WHAT)?,
             forces: memory::room(room, WHAT)?,
@@ -216,7 +225,7 @@ impl Solution {
             Time::StepEnd => {
                 whole = InLanes {
                     whole: Whole::new(own.of(compliance, all, rows)?, rows.len()),
-                    isa: self.isa,
+                    isa: self.responses.isa,
                 };
                 &mut whole
             }

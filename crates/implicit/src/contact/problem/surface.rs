@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use ::contact::{Body, Placed, Pose, Samples, Search};
+use ::contact::{Body, Placed, Pose, SKIN_MM, Samples, Search};
 
 use crate::bundle::Mesh;
 use crate::contact::buried::Buried;
 use crate::contact::rows::WHAT;
 use crate::contact::solid::{Sides, Solid};
 use crate::contact::state::State;
+use crate::contact::tool::Tool;
 use crate::error::Result;
 use crate::kernels::Isa;
 use crate::memory::{self, HeldBytes};
@@ -61,7 +62,17 @@ impl Surface {
         })
     }
 
-    /// Whether a sample lies inside of a tool where it is placed.
+    /// Whether a tool touches the tissue where it ends, or lies in it.
+    pub(super) fn is_reached(&mut self, tool: &Tool, state: State<'_>) -> bool {
+        let placed = Placed {
+            body: &tool.body,
+            pose: tool.pose,
+            skin: SKIN_MM,
+        };
+        self.is_in(placed, state) || self.buried(&tool.body, &tool.pose, state).is_some()
+    }
+
+    /// Whether a sample lies inside of a tool where it is placed, or within its skin.
     pub(super) fn is_in(&mut self, placed: Placed<'_>, state: State<'_>) -> bool {
         let position = |node| state.position(node);
         let found = self.search.find(&self.samples, &[placed], position);

@@ -4,8 +4,6 @@
 //!
 //! REQ-046: The work of the contact solves of a step is bounded for any poses of tools (twice that where ties or loads act and the first guess is of no use), and what they left unsolved is told by a flag.
 
-use std::time::Duration;
-
 use crate::clock::Instant;
 use crate::memory::HeldBytes;
 
@@ -15,6 +13,11 @@ const WORK_A_MS: u64 = 4_000_000;
 const SOLVES_WORK: u64 = 20_000_000;
 /// The same bound for a step in which no tool may lose its contact: a broad tool put into the tissue needs it to find its way out.
 const LONGEST_SOLVES_WORK: u64 = 3 * SOLVES_WORK;
+/// Work of a whole step, its iterations and what they are made with included, whose tools go farther than hands do: about twenty milliseconds. In such a step
+/// the tissue is far from balance, and comes to it over the steps that follow.
+const WHOLE_WORK: u64 = 80_000_000;
+/// What of it a base leaves to its iterations.
+const ITERATIONS_WORK: u64 = WHOLE_WORK / 3;
 /// What is left when solves begin to take fewer samples.
 const SHORT_OF_WORK: u64 = SOLVES_WORK / 2;
 
@@ -28,10 +31,11 @@ pub struct Work {
     solves: u64,
     /// A tool was put elsewhere, and comes out of the tissue over a few steps.
     leaps: bool,
-    /// When the step's budget of time ends, when half of it is over, and when it would end a second time.
+    /// What is left of [`WHOLE_WORK`]; none in steps at the pace of hands.
+    whole: Option<u64>,
+    /// When the step's budget of time ends, and when half of it is over.
     until: Option<Instant>,
     half: Option<Instant>,
-    twice: Option<Instant>,
 }
 
 impl Work {
@@ -40,9 +44,9 @@ impl Work {
         Work {
             solves: SOLVES_WORK,
             leaps: false,
+            whole: None,
             until: None,
             half: None,
-            twice: None,
         }
     }
 
@@ -55,20 +59,48 @@ impl Work {
         Work {
             solves: solves + more,
             leaps,
+            whole: None,
             until: None,
             half: None,
-            twice: None,
         }
     }
 
     /// A step whose guess is of no use begins again.
     pub fn renew(&mut self) {
         self.solves = self.solves.max(SOLVES_WORK);
+        self.whole = self.whole.map(|left| left.max(SOLVES_WORK));
+    }
+
+    /// No bound on the work of the whole step: it has to end well.
+    pub fn unbound(&mut self) {
+        self.whole = None;
     }
 
     /// Takes off what a solve has cost.
     pub fn take(&mut self, work: u64) {
         self.solves = self.solves.saturating_sub(work);
+        self.take_whole(work);
+    }
+
+    /// Takes off what something else of the step has cost.
+    pub fn take_whole(&mut self, work: u64) {
+        self.whole = self.whole.map(|left| left.saturating_sub(work));
+    }
+
+    /// Takes off what a base of iterations has cost: some of them are still made, or it would have been of no use.
+    pub fn take_base(&mut self, work: u64) {
+        let left = |left: u64| left.saturating_sub(work).max(left.min(ITERATIONS_WORK));
+        self.whole = self.whole.map(left);
+    }
+
+    /// Bounds the work of the whole step.
+    pub fn bound(&mut self) {
+        self.whole = self.whole.or(Some(WHOLE_WORK));
+    }
+
+    /// Whether tools go farther than hands do, so that the work of the whole step is bounded.
+    pub fn is_bounded(&self) -> bool {
+        self.whole.is_some()
     }
 
     /// A solve begins: whether it is short of work, or of time.
@@ -94,28 +126,29 @@ impl Work {
         let now = Instant::now();
         let left = until.map(|until| until.saturating_duration_since(now));
         self.half = left.map(|left| now + left / 2);
-        self.twice = until.zip(left).map(|(until, left)| until + left);
     }
 
-    /// Whether what takes so long, and begins now, ends before the budget of time would be over a second time.
-    pub fn ends_in_twice(&self, takes: Duration) -> bool {
-        self.twice
-            .is_none_or(|twice| Instant::now() + takes <= twice)
-    }
-
-    /// Whether half of the step's budget of time is over: too late for iterations that a guess could do without.
+    /// Whether half of the step's budget of time, or of its whole work, is over: too late for iterations that a guess could do without.
     pub fn is_half_over(&self) -> bool {
         self.half.is_some_and(|half| Instant::now() >= half)
+            || self.whole.is_some_and(|left| left <= WHOLE_WORK / 2)
     }
 
-    /// Whether it is a leap, half of whose budget of time is over: the rest of the step takes the least work.
+    /// Whether the step has nothing to spend on iterations that it can do without. A tool that was put elsewhere comes out of the tissue over the steps that follow:
+    /// iterations about where it is now, in a near set that would have to be made, bring nothing that those of the next step do not, but where the step
+    /// `must_be_sound`.
+    pub fn spares(&self, must_be_sound: bool) -> bool {
+        (self.leaps && !must_be_sound) || self.is_half_over()
+    }
+
+    /// Whether it is a leap, half of whose budget is over: the rest of the step takes the least work.
     fn is_hasty(&self) -> bool {
         self.leaps && self.is_half_over()
     }
 
-    /// Whether the step's budget of time is over.
+    /// Whether the step's budget of time, or its whole work, is over.
     pub fn is_late(&self) -> bool {
-        self.until.is_some_and(|until| Instant::now() >= until)
+        self.until.is_some_and(|until| Instant::now() >= until) || self.whole == Some(0)
     }
 
     /// Whether the solves of this step have taken their work or time.

@@ -27,6 +27,7 @@ impl LocalSolver {
         let _span = tracing::trace_span!("iteration").entered();
         let env = step.context.env();
         // The direction for the loads that are there; then what the contact changes at its end, as a second answer of the same preconditioner.
+        self.measured.work += self.set.near.direction_work();
         self.descend(step, problem)?;
         self.solve_contact(step, problem, base, way)?;
         // What of the change along the direction is linear is computed once here; each part `t` of it then costs the near elements alone.

@@ -17,12 +17,12 @@
 mod centres;
 mod clusters;
 mod columns;
+mod cost;
 mod course;
 mod factor;
 mod iteration;
 mod linear;
 mod linearisation;
-mod making;
 mod near;
 mod pairs;
 mod record;
@@ -44,7 +44,6 @@ use self::step::{add, dot, resize};
 use super::far::FarField;
 use super::input::{Input, SolverContext};
 use super::precondition::{Env, Preconditioner};
-use crate::clock::Instant;
 use crate::contact::ContactProblem;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
@@ -158,6 +157,7 @@ impl LocalSolver {
         let q = &step.preconditioner.coordinates;
         env.on_modes(q, &mut self.residuals.base_modes)?;
         self.clusters.begin(far, &self.set.near, base.u);
+        self.measured.work += self.set.near.base_work();
         // From here on `trial` is the base wherever no near node is: only near places are written in an iteration.
         self.residuals.trial.copy_from_slice(base.u);
         self.measured.far_det = f32::MAX;
@@ -210,7 +210,6 @@ impl LocalSolver {
             // What the pairs know of a narrower set is linear where the wider one is not.
             pairs.clear();
         }
-        let started = Instant::now();
         let is_made = self.set.is_of(now) && self.set.near.made == WHOLE;
         if !is_made {
             pairs.forget_layout();
@@ -225,9 +224,12 @@ impl LocalSolver {
         let Set { near, factor, .. } = &mut self.set;
         let last = &mut coming.last_factor;
         let is_new = factor.renew((env, near, far), u, &mut now.tangent, last)?;
-        if !is_made {
-            coming.making.took(started.elapsed());
-        }
+        // By what is wanted, and not by what is there: a restored scene has to make what this one has.
+        self.measured.work += match (is_other, is_new) {
+            (true, _) => near.making_work(),
+            (false, true) => near.factor_work(),
+            (false, false) => 0,
+        };
         pairs.lay_out(env, near, room)?;
         // One dear thing a step.
         if wanted.is_due && !is_other && !is_new {
@@ -251,10 +253,10 @@ impl LocalSolver {
         holds
     }
 
-    /// Whether a direction is not worth many tries: a leap's, of a body that is far in part. What inverts elements there leads into the tissue that the tool was
-    /// put into, and not out of it.
+    /// Whether a direction is not worth many tries: that of a step whose work is bounded, of a body that is far in part. What inverts elements there leads into the
+    /// tissue that the tool was put into, and not out of it.
     pub(super) fn is_dear(&self, problem: &ContactProblem) -> bool {
-        problem.ways.has_leapt && !self.set.near.is_all()
+        problem.work.is_bounded() && !self.set.near.is_all()
     }
 
     /// The level that the next step begins with, `u` being the state of this one.
@@ -305,6 +307,7 @@ impl LocalSolver {
     fn evaluate(&mut self, step: &mut StepContext<'_>, t: f32) -> Result<f32> {
         let env = step.context.env();
         let far = &step.context.corrections.far;
+        self.measured.work += self.set.near.try_work();
         self.residuals.next.clear(&self.set.near)?;
         let (near, inner) = (&mut self.set.near, &mut self.residuals.inner);
         let det = near.internal(&self.residuals.trial, inner);

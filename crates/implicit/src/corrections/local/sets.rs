@@ -4,7 +4,6 @@ use super::clusters::LeftOut;
 use super::course::{Choice, Course, WHOLE};
 use super::factor::NearFactor;
 use super::linear::WHAT;
-use super::making::Making;
 use super::near::NearSet;
 use super::pairs::Room;
 use crate::corrections::far::FarField;
@@ -34,8 +33,6 @@ pub(in crate::corrections) struct Coming {
     pub about: Vec<u32>,
     /// The number of the last factor that was made.
     pub last_factor: u64,
-    #[held(skip)]
-    pub making: Making,
 }
 
 impl Set {

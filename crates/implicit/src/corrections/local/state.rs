@@ -94,6 +94,8 @@ pub(in crate::corrections) struct Measured {
     pub far_mm: f32,
     /// Farthest that a far node has gone since the base, mm.
     pub far_moved_mm: f32,
+    /// Work since it was asked for, in multiplications of contact solves.
+    pub work: u64,
 }
 
 impl Measured {
@@ -106,6 +108,7 @@ impl Measured {
             moved_mm: 0.0,
             far_mm: 0.0,
             far_moved_mm: 0.0,
+            work: 0,
         }
     }
 }

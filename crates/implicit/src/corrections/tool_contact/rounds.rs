@@ -1,7 +1,5 @@
 //! The iterations of a step, in rounds: each from a base whose residual is known everywhere.
 
-use crate::clock::Instant;
-
 use super::{Iterate, ToolStep, is_sound, is_spent, over_kept};
 use crate::contact::ContactProblem;
 
@@ -42,11 +40,10 @@ impl ToolStep<'_> {
             self.report.residual = 1.0;
             return Ok(f64::INFINITY);
         }
-        let (work, local) = (&self.problem.work, &mut self.solver.local);
-        // A tool that was put elsewhere comes out over a few steps: the near set about it need not be made in one that it would make too long.
-        let is_long = self.problem.ways.has_leapt
-            && (local.as_mut()).is_some_and(|local| !local.coming.making.fits(work));
-        if work.is_spent() || is_long {
+        let work = &self.problem.work;
+        // A near set is not begun with less than half of the work of a step that is bounded.
+        let is_short = work.is_bounded() && work.spares(self.must_be_sound());
+        if work.is_spent() || is_short {
             // No iteration would begin, and its base takes as long as several.
             self.report.residual = 1.0;
             return Ok(0.0);
@@ -93,16 +90,13 @@ impl ToolStep<'_> {
         // Every way out of the loop means that no further round is asked for, but for one: the base is used up.
         made.is_enough = true;
         while made.iterations < self.input.enough.iterations {
-            let until = self.input.enough.until;
-            // The host's budget of time; where it has none, only counted work ends a step, and the bits are the same on every machine.
-            let late = until.is_some_and(|until| Instant::now() >= until);
-            let spent = late
-                || is_spent(
-                    self.input,
-                    self.problem,
-                    &self.report,
-                    self.input.enough.iterations,
-                );
+            let spent = is_spent(
+                self.input,
+                self.problem,
+                &self.report,
+                self.input.enough.iterations,
+            );
+            // The host's budget of time ends it too; where it has none, only counted work does, and the bits are the same on every machine.
             let spent = self.problem.work.is_spent() || (made.iterations > 0 && spent);
             if spent || !is_sound(made.size, at.det) {
                 return Ok(());
@@ -160,7 +154,11 @@ impl ToolStep<'_> {
             u: at.u,
             residual: at.g,
         };
-        local.begin(&mut step, base)
+        local.begin(&mut step, base)?;
+        problem
+            .work
+            .take_base(std::mem::take(&mut local.measured.work));
+        Ok(())
     }
 
     /// The state of the iterations into `at`, whose residual is not known then.
@@ -186,6 +184,9 @@ impl ToolStep<'_> {
         let (local, mut step, problem) = self.local_solver()?;
         let over = |problem: &mut ContactProblem, u: &[f32]| over_kept(input, problem, u, way);
         let is_better = local.improve(&mut step, problem, at.u, way, over)?;
+        problem
+            .work
+            .take_whole(std::mem::take(&mut local.measured.work));
         if is_better {
             at.det = local.measured.det;
         }

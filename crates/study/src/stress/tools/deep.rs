@@ -1,4 +1,4 @@
-//! Three tools at random deep poses, with much friction: the time of the worst step, without a budget and with one.
+//! Tools at random deep poses, with much friction, three at once and one alone: the time of the worst step, without a budget and with one.
 
 use std::path::Path;
 
@@ -27,20 +27,23 @@ pub(super) fn rows(bench: &Bench, path: &Path) -> Result<Vec<Row>> {
     let budget = format!("a budget of {:.0} ms", 1e3 * PART * bounded.step_s());
     let mut rows = Vec::new();
     for (model, budget) in [(free, "no budget"), (bounded, budget.as_str())] {
-        let name = format!("three tools at random deep poses, friction 0.6 to 1.2, {budget}");
-        rows.push(row(&mut Hands::of(bench, &model)?, &name)?);
+        // Three mostly fall back; what one alone does is iterated.
+        for (count, tools) in [(3, "three tools"), (1, "one tool")] {
+            let name = format!("{tools} at random deep poses, friction 0.6 to 1.2, {budget}");
+            rows.push(row(&mut Hands::of(bench, &model)?, count, &name)?);
+        }
     }
     Ok(rows)
 }
 
-fn row(hands: &mut Hands, name: &str) -> Result<Row> {
+fn row(hands: &mut Hands, count: usize, name: &str) -> Result<Row> {
     let mut random = SplitMix(44);
     let spread = sites(hands.bench, 24)?;
     let steps = hands.bench.steps(STEPS);
     hands.driver.reset()?;
     let (mut walls, mut times, mut contact, mut refused) = (vec![], vec![], 0.0f64, 0usize);
     while walls.len() + refused < steps {
-        let tools: Vec<Tool> = (0..3)
+        let tools: Vec<Tool> = (0..count)
             .map(|_| Tool {
                 friction: between(&mut random, 0.6, 1.2),
                 tear_off_mn: 0.0,
