@@ -64,6 +64,24 @@ fn what_no_iteration_corrected_keeps_its_estimated_error() {
     }
 }
 
+/// Where a tool has leapt to, corrections come with the step after it.
+#[test]
+fn a_leap_into_the_tissue_is_corrected_in_the_steps_that_follow() {
+    let scene = scene(&model("tiny-corrected"), &with(5));
+    let away = pressing(&scene, -60.0, Vector::ZERO);
+    let on_it = pressing(&scene, 1.0, Vector::ZERO);
+    let stepped = |tool: &Tool| {
+        step(&scene, std::slice::from_ref(tool));
+        (scene.stats(), readings(&scene)[0])
+    };
+    stepped(&away);
+    let (leap, met) = stepped(&on_it);
+    assert!(leap.corrections == 0 && leap.error_mm > 0.0, "{leap:?}");
+    assert!(met.contacts > 0 && met.penetration_mm < 1.0, "{met:?}");
+    let (next, held) = stepped(&on_it);
+    assert!(next.corrections == 5 && held.contacts > 0, "{next:?}");
+}
+
 #[test]
 fn wild_tools_stay_finite_and_the_tissue_comes_back() {
     for corrections in [0, 1, 3] {
