@@ -64,7 +64,7 @@ fn what_no_iteration_corrected_keeps_its_estimated_error() {
     }
 }
 
-/// Where a tool has leapt to, corrections come with the step after it.
+/// Where a tool has leapt to, corrections come with the step after it. One that leaps away, as a hand lays an instrument down, takes none from the one that presses.
 #[test]
 fn a_leap_into_the_tissue_is_corrected_in_the_steps_that_follow() {
     let scene = scene(&model("tiny-corrected"), &with(5));
@@ -80,6 +80,11 @@ fn a_leap_into_the_tissue_is_corrected_in_the_steps_that_follow() {
     assert!(met.contacts > 0 && met.penetration_mm < 1.0, "{met:?}");
     let (next, held) = stepped(&on_it);
     assert!(next.corrections == 5 && held.contacts > 0, "{next:?}");
+    for laid_down in [pressing(&scene, -2.0, Vector::ZERO), away] {
+        step(&scene, &[on_it.clone(), laid_down]);
+        let stats = scene.stats();
+        assert!(stats.corrections == 5, "{stats:?}");
+    }
 }
 
 #[test]

@@ -81,12 +81,18 @@ pub trait Rows {
 
     /// Adds to `shift [3n]` what a change of the force at a contact does, by its three rows.
     fn add_shift(&mut self, contact: usize, change: Vector, shift: &mut [f32]) {
-        let (x, others) = self.rows(contact).split_at(shift.len());
-        let (y, z) = others.split_at(shift.len());
-        let rows = x.iter().zip(y).zip(z);
-        for (shift, ((x, y), z)) in shift.iter_mut().zip(rows) {
-            *shift = *shift + x * change.x + y * change.y + z * change.z;
-        }
+        add_rows(self.rows(contact), change, shift);
+    }
+}
+
+/// `shift += rows^T change` with `rows [3,3n]`: compiled for the instructions of whoever calls it, with the same bits.
+#[inline(always)]
+pub fn add_rows(rows: &[f32], change: Vector, shift: &mut [f32]) {
+    let (x, others) = rows.split_at(shift.len());
+    let (y, z) = others.split_at(shift.len());
+    let rows = x.iter().zip(y).zip(z);
+    for (shift, ((x, y), z)) in shift.iter_mut().zip(rows) {
+        *shift = *shift + x * change.x + y * change.y + z * change.z;
     }
 }
 

@@ -28,7 +28,6 @@ pub mod ragged;
 pub mod random;
 pub mod respond;
 pub mod rows;
-pub mod three_rows;
 pub mod vectors;
 
 // `derive(HeldBytes)` looks for it here.

@@ -5,11 +5,11 @@ use ::contact::{Rows, Vector};
 
 use super::compliance::{Compliance, WHAT};
 use super::delassus::Delassus;
+use super::in_lanes::add_rows_by;
 use super::ties::Points;
 use crate::error::Result;
 use crate::kernels::Isa;
 use crate::kernels::respond::columns_f32;
-use crate::kernels::three_rows::add_three_rows;
 use crate::memory::{self, HeldBytes};
 
 /// The modes at the samples of the last call, and rows that were made since it.
@@ -137,8 +137,7 @@ impl Rows for At<'_> {
     }
 
     fn add_shift(&mut self, contact: usize, change: Vector, shift: &mut [f32]) {
-        let isa = self.isa;
-        add_three_rows(isa, self.rows(contact), change.to_array(), shift);
+        add_rows_by(self.isa, self.rows(contact), change, shift);
     }
 }
 

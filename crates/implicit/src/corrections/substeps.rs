@@ -8,7 +8,9 @@ use super::load::part_of;
 use super::solver::{ImplicitSolver, SMALLEST_DET};
 use super::substepper::Substepper;
 use super::tool_contact::make_loaded;
-use crate::contact::{ContactProblem, Delassus, MAX_TIES, MAX_TOOLS, Past, Placed, Tool};
+use crate::contact::{
+    ContactProblem, Delassus, MAX_TIES, MAX_TOOLS, Past, Placed, Tool, bound_work,
+};
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
@@ -103,9 +105,7 @@ impl ImplicitSolver {
         problem.work.end_by(input.enough.until);
         // From an inverted state a step begins at rest, and so would each of its parts.
         let lost = self.motion.min_det < SMALLEST_DET;
-        if lost {
-            problem.work.bound();
-        }
+        bound_work(problem, input.rest, input.last, lost);
         let _awake = context.pool.keep_awake();
         if let Some(relaxing) = &mut self.relaxing {
             relaxing.remember(context, input, false, &mut self.balance.scratch)?;

@@ -230,10 +230,10 @@ impl ToolStep<'_> {
                 self.press(self.input.last, way, at.u)?;
                 // An iteration after each of `iterated` parts of the load but the last.
                 let due = part * iterated / parts > last * iterated / parts;
-                let spent = self.problem.work.is_spent()
-                    || is_spent(self.input, self.problem, &self.report, 1);
-                if due && part < parts && !spent && !self.problem.work.spares(self.must_be_sound())
-                {
+                let work = &self.problem.work;
+                let spent = work.is_spent() || work.is_half_over() || work.is_short();
+                let spent = spent || is_spent(self.input, self.problem, &self.report, 1);
+                if due && part < parts && !spent {
                     self.solver.settle(env, at.u)?;
                     self.evaluate(at)?;
                     if at.det > SMALLEST_DET {
@@ -251,7 +251,7 @@ impl ToolStep<'_> {
             if at.det > least
                 || iterated >= MOST_PARTS
                 || self.problem.work.is_spent()
-                || self.problem.work.spares(self.must_be_sound())
+                || self.problem.work.is_short()
                 || is_spent(self.input, self.problem, &self.report, 1)
             {
                 return Ok(());

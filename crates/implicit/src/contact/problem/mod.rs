@@ -9,6 +9,7 @@ mod forces;
 mod gauge;
 mod loads;
 mod look;
+mod pace;
 mod prescribed;
 mod solution;
 mod solve;
@@ -23,6 +24,7 @@ use std::time::Duration;
 use ::contact::grasp::REACH_MM;
 use ::contact::{Placed as PlacedTool, Samples};
 
+pub use pace::bound_work;
 pub use solution::Change;
 
 use super::past::{Held, Past};
@@ -46,8 +48,6 @@ pub(crate) use work::Work;
 
 /// A tool that goes farther in a step is quick, mm.
 const QUICK_MM: f32 = 0.5;
-/// Hands do not go so far in a step, mm: 600 mm/s in steps of 20 ms.
-const FAR_MM: f32 = 12.0;
 /// Tissue no deeper than this in a tool is clear of it, mm.
 const RESTING_MM: f32 = 0.9;
 
@@ -119,21 +119,7 @@ impl ContactProblem {
         self.ways.lay_in_tissue = false;
         // Budgets come after it: how much a step may cost depends on whether a tool may lose its contact.
         self.enter(tools, ties, rest, start)?;
-        let ways = &self.ways;
-        let is_far = ways.has_leapt || ways.longest() > FAR_MM;
-        // A tool that leaves the tissue, however fast, leaves it to swing as it does. Where it comes to may be empty because another tool has pushed the tissue away.
-        let [last, at_rest] = [start, &[]].map(|u| State { rest, u, start: u });
-        let comes_far = is_far
-            && (ways.tools.iter()).any(|tool| {
-                self.surface.is_reached(tool, last) || self.surface.is_reached(tool, at_rest)
-            });
-        let leaps = ways.has_leapt && comes_far;
-        self.work = Work::of(ways.may_lose(), leaps, self.tied.work());
-        // The tip of a needle lies in the tissue before it has pushed it.
-        let is_thin = ways.tools.iter().any(|tool| tool.body.pierces());
-        if comes_far || (ways.lay_in_tissue && !is_thin) {
-            self.work.bound();
-        }
+        self.work = Work::of(self.ways.may_lose(), self.tied.work());
         Ok(())
     }
 

@@ -12,6 +12,7 @@ use super::look::NearRows;
 use super::work::Work;
 use crate::contact::Compliance;
 use crate::contact::delassus::Delassus;
+use crate::contact::in_lanes::InLanes;
 use crate::contact::inertial_compliance::InertialCompliance;
 use crate::contact::rows::MOST_ROWS;
 use crate::contact::rows::Row;
@@ -20,7 +21,6 @@ use crate::contact::state::State;
 use crate::contact::ties::{NO_TOOL, Points};
 use crate::error::Result;
 use crate::kernels::Isa;
-use crate::kernels::three_rows::add_three_rows;
 use crate::memory::{self, HeldBytes};
 
 /// Multiplications of one linearisation at most: about half a millisecond.
@@ -113,27 +113,6 @@ impl Responses {
     /// `f^T W f` under forces on them, mN mm.
     pub fn work(&self, force: impl Fn(u32) -> Vector) -> f32 {
         self.tangent.work(force)
-    }
-}
-
-/// All of `W`, whose rows are added up by the instructions of this processor.
-struct InLanes<'a> {
-    whole: Whole<'a>,
-    isa: Isa,
-}
-
-impl Rows for InLanes<'_> {
-    fn contacts(&self) -> usize {
-        self.whole.contacts()
-    }
-
-    fn rows(&mut self, contact: usize) -> &[f32] {
-        self.whole.rows(contact)
-    }
-
-    fn add_shift(&mut self, contact: usize, change: Vector, shift: &mut [f32]) {
-        let rows = self.whole.rows(contact);
-        add_three_rows(self.isa, rows, change.to_array(), shift);
     }
 }
 

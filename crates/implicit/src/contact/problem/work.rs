@@ -50,18 +50,15 @@ impl Work {
         }
     }
 
-    /// Of a step whose tools may lose their contact, or of which one `leaps`; `more` for ties.
-    pub fn of(may_lose: bool, leaps: bool, more: u64) -> Work {
+    /// Of a step whose tools may lose their contact; `more` for ties.
+    pub fn of(may_lose: bool, more: u64) -> Work {
         let solves = match may_lose {
             true => SOLVES_WORK,
             false => LONGEST_SOLVES_WORK,
         };
         Work {
             solves: solves + more,
-            leaps,
-            whole: None,
-            until: None,
-            half: None,
+            ..Work::new()
         }
     }
 
@@ -73,7 +70,7 @@ impl Work {
 
     /// No bound on the work of the whole step: it has to end well.
     pub fn unbound(&mut self) {
-        self.whole = None;
+        (self.whole, self.leaps) = (None, false);
     }
 
     /// Takes off what a solve has cost.
@@ -93,9 +90,10 @@ impl Work {
         self.whole = self.whole.map(left);
     }
 
-    /// Bounds the work of the whole step.
-    pub fn bound(&mut self) {
+    /// Bounds the work of the whole step, in which a tool `leaps` or not.
+    pub fn bound(&mut self, leaps: bool) {
         self.whole = self.whole.or(Some(WHOLE_WORK));
+        self.leaps |= leaps;
     }
 
     /// Whether tools go farther than hands do, so that the work of the whole step is bounded.
@@ -134,11 +132,10 @@ impl Work {
             || self.whole.is_some_and(|left| left <= WHOLE_WORK / 2)
     }
 
-    /// Whether the step has nothing to spend on iterations that it can do without. A tool that was put elsewhere comes out of the tissue over the steps that follow:
-    /// iterations about where it is now, in a near set that would have to be made, bring nothing that those of the next step do not, but where the step
-    /// `must_be_sound`.
-    pub fn spares(&self, must_be_sound: bool) -> bool {
-        (self.leaps && !must_be_sound) || self.is_half_over()
+    /// Whether a step that is bounded begins no near set any more. A tool that was put elsewhere comes out of the tissue over the steps that follow: iterations about
+    /// where it is now, in a near set that would have to be made, bring nothing that those of the next step do not.
+    pub fn is_short(&self) -> bool {
+        self.leaps || (self.is_bounded() && self.is_half_over())
     }
 
     /// Whether it is a leap, half of whose budget is over: the rest of the step takes the least work.

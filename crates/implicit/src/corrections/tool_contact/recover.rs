@@ -27,7 +27,6 @@ impl ToolStep<'_> {
         let was_sound = self.solver.motion.min_det >= SMALLEST_DET && !self.input.still;
         if self.must_be_sound() {
             self.problem.work.renew();
-            self.problem.work.unbound();
         } else if !was_sound || self.problem.work.is_spent() {
             return Ok(f64::INFINITY);
         }
@@ -70,8 +69,7 @@ impl ToolStep<'_> {
     pub(super) fn may_begin_again(&self) -> bool {
         let was_sound = self.solver.motion.min_det >= SMALLEST_DET && !self.input.still;
         let leapt = self.problem.ways.has_leapt;
-        let has_work =
-            !self.problem.work.is_spent() && !self.problem.work.spares(self.must_be_sound());
+        let has_work = !self.problem.work.is_spent() && !self.problem.work.is_short();
         was_sound && !leapt && self.problem.past.tools_push() && has_work
     }
 }

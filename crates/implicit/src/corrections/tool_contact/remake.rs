@@ -31,6 +31,9 @@ pub(in crate::corrections) fn make_loaded(
         report: Report::default(),
     };
     let _awake = context.pool.keep_awake();
+    if step.must_be_sound() {
+        step.problem.work.unbound();
+    }
     step.balance_loaded(next, from_published, true)?;
     // Tools that no single step follows stop on their way, at last where they were; beside one that was put elsewhere they do so at once, and where a budget of
     // time is over.

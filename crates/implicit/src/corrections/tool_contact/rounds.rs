@@ -42,8 +42,7 @@ impl ToolStep<'_> {
         }
         let work = &self.problem.work;
         // A near set is not begun with less than half of the work of a step that is bounded.
-        let is_short = work.is_bounded() && work.spares(self.must_be_sound());
-        if work.is_spent() || is_short {
+        if work.is_spent() || work.is_short() {
             // No iteration would begin, and its base takes as long as several.
             self.report.residual = 1.0;
             return Ok(0.0);
