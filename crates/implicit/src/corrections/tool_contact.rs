@@ -19,6 +19,7 @@ mod freely;
 mod recover;
 mod remake;
 mod rounds;
+mod thrown;
 mod whole;
 
 pub(super) use remake::make_loaded;
@@ -32,6 +33,8 @@ use crate::contact::{Compliance, ContactProblem, State};
 use crate::corrections::gravity_columns::add_gravity;
 use crate::corrections::lift::lift;
 use crate::error::Result;
+use recover::begin_again_by_halves;
+use thrown::leave_thrown_guess;
 
 /// A step that leaves tissue deeper inside of a tool than this has lost the contact, mm.
 pub(super) const SUNK_MM: f32 = 0.9;
@@ -152,22 +155,17 @@ impl ToolStep<'_> {
         // `fall_back` and `recover` come back to it.
         self.solver.fields.guess.copy_from_slice(at.u);
         self.problem.kept.keep_guess(&self.problem.next)?;
+        let has_begun_again = leave_thrown_guess(self, at)?;
         let mut size = self.improve_loaded(at)?;
         if !is_sound(size, at.det) {
             size = self.recover(at)?;
         }
         // A state in balance may still have lost the tool: a thin one has gone through the surface.
         let mut left = sunk(self.input, self.problem, at.u, 1.0);
-        if left > SUNK_MM && is_sound(size, at.det) && self.may_begin_again() {
+        let may_begin = !has_begun_again && self.may_begin_again();
+        if left > SUNK_MM && is_sound(size, at.det) && may_begin {
             // The guess has lost it: tissue that swings goes on past a small tool.
-            self.begin_again(at)?;
-            if self.problem.ways.longest() > LEAST_WAY_MM {
-                // Half of the tools' way first: the whole may lose them again.
-                self.begin_round(at)?;
-                self.improve_at(at, 0.5)?;
-                self.end_round(at)?;
-                self.evaluate(at)?;
-            }
+            begin_again_by_halves(self, at)?;
             size = self.improve_loaded(at)?;
             left = sunk(self.input, self.problem, at.u, 1.0);
         }

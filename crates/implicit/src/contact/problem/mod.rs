@@ -119,7 +119,8 @@ impl ContactProblem {
         self.ways.lay_in_tissue = false;
         // Budgets come after it: how much a step may cost depends on whether a tool may lose its contact.
         self.enter(tools, ties, rest, start)?;
-        self.work = Work::of(self.ways.may_lose(), self.tied.work());
+        let nodes = start.len() / 3;
+        self.work = Work::of(nodes, self.ways.may_lose(), self.tied.work());
         Ok(())
     }
 

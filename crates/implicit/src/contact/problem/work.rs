@@ -2,7 +2,7 @@
 //!
 //! Work is counted and not timed, so that a step has the same bits on every machine; only a host's budget is a time.
 //!
-//! REQ-046: The work of the contact solves of a step is bounded for any poses of tools (twice that where ties or loads act and the first guess is of no use), and what they left unsolved is told by a flag.
+//! REQ-046: The work of a step, and that of its contact solves, is bounded for any poses of tools (the whole is not, and the solves take twice that, where ties or loads act and the first guess is of no use), and what the solves left unsolved is told by a flag.
 
 use crate::clock::Instant;
 use crate::memory::HeldBytes;
@@ -13,11 +13,15 @@ const WORK_A_MS: u64 = 4_000_000;
 const SOLVES_WORK: u64 = 20_000_000;
 /// The same bound for a step in which no tool may lose its contact: a broad tool put into the tissue needs it to find its way out.
 const LONGEST_SOLVES_WORK: u64 = 3 * SOLVES_WORK;
-/// Work of a whole step, its iterations and what they are made with included, whose tools go farther than hands do: about twenty milliseconds. In such a step
-/// the tissue is far from balance, and comes to it over the steps that follow.
-const WHOLE_WORK: u64 = 80_000_000;
-/// What of it a base leaves to its iterations.
-const ITERATIONS_WORK: u64 = WHOLE_WORK / 3;
+/// Work of a whole step, its iterations and what they are made with included, at least and for each node: about eighty milliseconds at 21,708 nodes. One that has
+/// come to no end by then has lost its tools again in each attempt, and ends with what it has.
+const STEP_WORK: u64 = 4 * FAR_WORK;
+const STEP_WORK_A_NODE: u64 = 15_000;
+/// The same bound where tools go farther than hands do: about twenty milliseconds. In such a step the tissue is far from balance, and comes to it over the
+/// steps that follow.
+const FAR_WORK: u64 = 80_000_000;
+/// What of that a base leaves to its iterations.
+const ITERATIONS_WORK: u64 = FAR_WORK / 3;
 /// What is left when solves begin to take fewer samples.
 const SHORT_OF_WORK: u64 = SOLVES_WORK / 2;
 
@@ -31,8 +35,9 @@ pub struct Work {
     solves: u64,
     /// A tool was put elsewhere, and comes out of the tissue over a few steps.
     leaps: bool,
-    /// What is left of [`WHOLE_WORK`]; none in steps at the pace of hands.
-    whole: Option<u64>,
+    /// What is left to the whole step: of [`STEP_WORK`], or of [`FAR_WORK`] where tools go farther than hands do.
+    whole: u64,
+    is_bounded: bool,
     /// When the step's budget of time ends, and when half of it is over.
     until: Option<Instant>,
     half: Option<Instant>,
@@ -44,20 +49,22 @@ impl Work {
         Work {
             solves: SOLVES_WORK,
             leaps: false,
-            whole: None,
+            whole: STEP_WORK,
+            is_bounded: false,
             until: None,
             half: None,
         }
     }
 
-    /// Of a step whose tools may lose their contact; `more` for ties.
-    pub fn of(may_lose: bool, more: u64) -> Work {
+    /// Of a step of so many nodes whose tools may lose their contact; `more` for ties.
+    pub fn of(nodes: usize, may_lose: bool, more: u64) -> Work {
         let solves = match may_lose {
             true => SOLVES_WORK,
             false => LONGEST_SOLVES_WORK,
         };
         Work {
             solves: solves + more,
+            whole: STEP_WORK.max(STEP_WORK_A_NODE * nodes as u64),
             ..Work::new()
         }
     }
@@ -65,12 +72,12 @@ impl Work {
     /// A step whose guess is of no use begins again.
     pub fn renew(&mut self) {
         self.solves = self.solves.max(SOLVES_WORK);
-        self.whole = self.whole.map(|left| left.max(SOLVES_WORK));
+        self.whole = self.whole.max(SOLVES_WORK);
     }
 
     /// No bound on the work of the whole step: it has to end well.
     pub fn unbound(&mut self) {
-        (self.whole, self.leaps) = (None, false);
+        (self.whole, self.is_bounded, self.leaps) = (u64::MAX, false, false);
     }
 
     /// Takes off what a solve has cost.
@@ -81,24 +88,25 @@ impl Work {
 
     /// Takes off what something else of the step has cost.
     pub fn take_whole(&mut self, work: u64) {
-        self.whole = self.whole.map(|left| left.saturating_sub(work));
+        self.whole = self.whole.saturating_sub(work);
     }
 
     /// Takes off what a base of iterations has cost: some of them are still made, or it would have been of no use.
     pub fn take_base(&mut self, work: u64) {
-        let left = |left: u64| left.saturating_sub(work).max(left.min(ITERATIONS_WORK));
-        self.whole = self.whole.map(left);
+        let least = self.whole.min(ITERATIONS_WORK);
+        self.whole = self.whole.saturating_sub(work).max(least);
     }
 
-    /// Bounds the work of the whole step, in which a tool `leaps` or not.
+    /// Bounds the work of a step whose tools go farther than hands do, in which one `leaps` or not.
     pub fn bound(&mut self, leaps: bool) {
-        self.whole = self.whole.or(Some(WHOLE_WORK));
+        self.whole = self.whole.min(FAR_WORK);
+        self.is_bounded = true;
         self.leaps |= leaps;
     }
 
-    /// Whether tools go farther than hands do, so that the work of the whole step is bounded.
+    /// Whether tools go farther than hands do, so that the step ends early.
     pub fn is_bounded(&self) -> bool {
-        self.whole.is_some()
+        self.is_bounded
     }
 
     /// A solve begins: whether it is short of work, or of time.
@@ -128,8 +136,7 @@ impl Work {
 
     /// Whether half of the step's budget of time, or of its whole work, is over: too late for iterations that a guess could do without.
     pub fn is_half_over(&self) -> bool {
-        self.half.is_some_and(|half| Instant::now() >= half)
-            || self.whole.is_some_and(|left| left <= WHOLE_WORK / 2)
+        self.half.is_some_and(|half| Instant::now() >= half) || self.whole <= FAR_WORK / 2
     }
 
     /// Whether a step that is bounded begins no near set any more. A tool that was put elsewhere comes out of the tissue over the steps that follow: iterations about
@@ -145,7 +152,7 @@ impl Work {
 
     /// Whether the step's budget of time, or its whole work, is over.
     pub fn is_late(&self) -> bool {
-        self.until.is_some_and(|until| Instant::now() >= until) || self.whole == Some(0)
+        self.until.is_some_and(|until| Instant::now() >= until) || self.whole == 0
     }
 
     /// Whether the solves of this step have taken their work or time.
@@ -169,5 +176,31 @@ impl Work {
         } else {
             LEAST_PARTS
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Verifies REQ-046.
+    #[test]
+    fn every_step_ends_and_one_of_leaps_sooner() {
+        let (mut hand, mut leap) = (Work::of(1000, true, 0), Work::of(1000, true, 0));
+        leap.bound(true);
+        let steps = |work: &mut Work| {
+            let mut left = 0..;
+            left.find(|_| {
+                work.take_whole(1_000_000);
+                work.is_spent()
+            })
+        };
+        let (hand, leap) = (steps(&mut hand), steps(&mut leap));
+        assert!(leap < hand && hand < Some(1000), "{leap:?} {hand:?}");
+        // Where no state may be left inside out none ends early.
+        let mut sound = Work::of(1000, true, 0);
+        sound.unbound();
+        sound.take_whole(u64::MAX / 2);
+        assert!(!sound.is_late());
     }
 }

@@ -1,0 +1,52 @@
+//! A guess that throws the tissue off balance under tools that lie still: the step begins with the last state instead.
+//!
+//! Deep under a thin tool the linear response of the body at rest says little: forces that change from one sample to the next throw the tissue, and
+//! iterations do not bring it back. Where tools have come nearer the last state is in balance too, but not in contact.
+
+use super::{Iterate, LEAST_WAY_MM, ToolStep};
+use crate::corrections::precondition::mask_held;
+use crate::corrections::solver::SMALLEST_DET;
+use crate::error::Result;
+
+/// A guess leaves so many times the loads out of balance at most, or what the last state does times `WORSE`: ordinary ones leave half of the loads.
+const THROWN: f64 = 2.0;
+const WORSE: f64 = 3.0;
+
+/// Begins with the last state, with the forces that it had, where the guess is much farther from balance; tells whether it does.
+pub(super) fn leave_thrown_guess(step: &mut ToolStep<'_>, at: &mut Iterate<'_>) -> Result<bool> {
+    let lies_still = step.problem.ways.longest() <= LEAST_WAY_MM;
+    if !lies_still || at.det < SMALLEST_DET || !step.may_begin_again() {
+        return Ok(false);
+    }
+    let (guess, loads) = left_out(step, at);
+    if guess <= THROWN * loads {
+        return Ok(false);
+    }
+    step.begin_again(at)?;
+    let (last, _) = left_out(step, at);
+    if at.det >= SMALLEST_DET && guess > WORSE * last {
+        return Ok(true);
+    }
+    step.problem.kept.take_guess(&mut step.problem.next);
+    at.u.copy_from_slice(&step.solver.fields.guess);
+    step.evaluate(at)?;
+    Ok(false)
+}
+
+/// `|F(u) - B^T f|` and `|B^T f|` on the free nodes, µN.
+fn left_out(step: &mut ToolStep<'_>, at: &Iterate<'_>) -> (f64, f64) {
+    let held = &step.context.held.is;
+    let left = &mut step.solver.fields.q;
+    left.copy_from_slice(at.g);
+    let mut loads = 0.0;
+    step.problem.each_load(|node, force| {
+        let force = force * 1e3;
+        loads += f64::from(force.length_squared());
+        let at = 3 * node as usize;
+        let sum = left[at..at + 3].iter_mut().zip(force.to_array());
+        sum.for_each(|(left, force)| *left -= force);
+    });
+    mask_held(held, left);
+    let sum: f64 = left.iter().map(|x| f64::from(*x) * f64::from(*x)).sum();
+    (libm::sqrt(sum), libm::sqrt(loads))
+}
