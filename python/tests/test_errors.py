@@ -121,6 +121,14 @@ def test_onnx_runtime_comes_from_its_package():
     assert "onnxruntime" in run.stdout and "capi" in run.stdout, run.stdout + run.stderr
 
 
+def test_a_bundle_with_a_network_says_which_package_is_missing():
+    """The wheel does not ask for ONNX Runtime; a bundle that needs it says what to install."""
+    code = f"import sys, upt; sys.modules['onnxruntime'] = None; upt.Model({str(FIXTURES / 'tiny-reduced')!r})"
+    environment = os.environ | {"ORT_DYLIB_PATH": str(FIXTURES / "no-such-library")}
+    run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert "RuntimeLibraryError" in run.stderr and 'pip install "libupt[learned]"' in run.stderr, run.stderr
+
+
 def test_a_process_may_end_with_scenes_alive():
     code = f"import upt; s = upt.Model({str(FIXTURES / 'tiny-reduced')!r}).scene(); s.step(); s.submit()"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

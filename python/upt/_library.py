@@ -10,7 +10,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from upt._native import ABI_VERSION, FUNCTIONS, InitOptions
+from upt._native import ABI_VERSION, FUNCTIONS, InitOptions, Status
 from upt.errors import error_of
 
 #: File name of the library by `sys.platform`.
@@ -47,7 +47,10 @@ _started = False
 def check(status: int) -> int:
     """Raises what a negative status stands for."""
     if status < 0:
-        raise error_of(status, lib.upt_last_error().decode())
+        message = lib.upt_last_error().decode()
+        if status == Status.RUNTIME and packaged_onnxruntime() is None:
+            message += '; Python has one by `pip install "libupt[learned]"`'
+        raise error_of(status, message)
     return status
 
 
