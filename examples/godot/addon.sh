@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The extension as Godot's Asset Library takes it, made from a built libupt:
-#   addon.sh OUT        OUT/addons/libupt, and OUT/libupt-godot-VERSION-linux-x64.zip
+#   addon.sh OUT        OUT/addons/libupt, OUT/libupt-godot-VERSION-linux-x64.zip, and the icon for the Library's page, OUT/libupt-godot-icon.png
 # The engine writes out the interface that the extension is compiled with: GODOT in the environment, else it is fetched beside.
 # Environment: UPT_ROOT, UPT_LIB_DIR, UPT_INCLUDE_DIR, UPT_BUNDLES, UPT_BUILD_DIR, UPT_PYTHON as for run.sh.
 set -euo pipefail
@@ -35,6 +35,7 @@ cp -r "$bundles/liver-coarse" "$addon/bundles/"
 (cd "$root" && "$python" tests/style/licences.py --write "$addon/THIRD-PARTY.txt" >/dev/null)
 # Godot imports nothing of the organ.
 touch "$addon/bundles/.gdignore"
+(cd "$build" && "$godot" --headless --script "$here/icon.gd" -- "$here/addon/icon.svg" "$out/libupt-godot-icon.png") >/dev/null
 
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$root/Cargo.toml" | head -n 1)
 "$python" - "$out" "$out/libupt-godot-$version-linux-x64.zip" <<'END'

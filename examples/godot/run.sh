@@ -62,6 +62,10 @@ installed() {
   mkdir -p "$empty"
   touch "$empty/project.godot"
   python3 -m zipfile -e "$build"/addon/libupt-godot-*.zip "$empty"
+  # As the Asset Library takes it: one folder, with licence, README and icon, and beside it the icon as a PNG of 128 pixels or more.
+  [ "$(cd "$empty" && ls -A && ls -A addons)" = $'addons\nproject.godot\nlibupt' ]
+  (cd "$empty/addons/libupt" && ls libupt.gdextension README.md icon.svg LICENSE-MIT LICENSE-APACHE NOTICE THIRD-PARTY.txt bin/linux-x64/libupt{_godot.so,.so.0})
+  python3 -c 'import struct, sys; print(*struct.unpack(">8x4x4sII", open(sys.argv[1], "rb").read(24)))' "$build/addon/libupt-godot-icon.png" | grep -qx "b'IHDR' 256 256"
   sed -n '/^```gdscript$/,/^```$/p' "$empty/addons/libupt/README.md" | sed '/^```/d' >"$empty/first.gd"
   (
     cd "$empty"
