@@ -24,7 +24,6 @@ mod whole;
 
 pub(super) use remake::make_loaded;
 
-use super::balance::Balance;
 use super::input::{Input, Report, SolverContext};
 use super::passes;
 use super::precondition::{Env, Preconditioner, mask_held};
@@ -33,8 +32,6 @@ use crate::contact::{Compliance, ContactProblem, State};
 use crate::corrections::gravity_columns::add_gravity;
 use crate::corrections::lift::lift;
 use crate::error::Result;
-use recover::begin_again_by_halves;
-use thrown::leave_thrown_guess;
 
 /// A step that leaves tissue deeper inside of a tool than this has lost the contact, mm.
 pub(super) const SUNK_MM: f32 = 0.9;
@@ -66,20 +63,6 @@ struct Iterate<'a> {
     g: &'a mut Vec<f32>,
     /// Smallest det F.
     det: f32,
-}
-
-impl Iterate<'_> {
-    /// `F(u)` and det F of a state that no iteration led to, in a step from `last`.
-    fn evaluate(
-        &mut self,
-        balance: &mut Balance,
-        context: SolverContext<'_>,
-        last: &[f32],
-        report: &mut Report,
-    ) -> Result<()> {
-        (self.det, _) = balance.residual(context, [last, self.u, self.u], self.g, report)?;
-        Ok(())
-    }
 }
 
 /// A step that tools drive, while it is made.
@@ -155,17 +138,24 @@ impl ToolStep<'_> {
         // `fall_back` and `recover` come back to it.
         self.solver.fields.guess.copy_from_slice(at.u);
         self.problem.kept.keep_guess(&self.problem.next)?;
-        let has_begun_again = leave_thrown_guess(self, at)?;
+        let has_begun_again = self.leave_thrown_guess(at)?;
         let mut size = self.improve_loaded(at)?;
         if !is_sound(size, at.det) {
             size = self.recover(at)?;
         }
         // A state in balance may still have lost the tool: a thin one has gone through the surface.
         let mut left = sunk(self.input, self.problem, at.u, 1.0);
-        let may_begin = !has_begun_again && self.may_begin_again();
-        if left > SUNK_MM && is_sound(size, at.det) && may_begin {
+        let is_sunk = left > SUNK_MM && is_sound(size, at.det);
+        if is_sunk && !has_begun_again && self.may_begin_again() {
             // The guess has lost it: tissue that swings goes on past a small tool.
-            begin_again_by_halves(self, at)?;
+            self.begin_again(at)?;
+            if self.problem.ways.longest() > LEAST_WAY_MM {
+                // The whole way may lose them again.
+                self.begin_round(at)?;
+                self.improve_at(at, 0.5)?;
+                self.end_round(at)?;
+                self.evaluate(at)?;
+            }
             size = self.improve_loaded(at)?;
             left = sunk(self.input, self.problem, at.u, 1.0);
         }
@@ -187,12 +177,10 @@ impl ToolStep<'_> {
     fn evaluate(&mut self, at: &mut Iterate<'_>) -> Result<()> {
         let nodes = at.u.len() as u64 / 3;
         self.problem.work.take_whole(EVALUATION_WORK * nodes);
-        at.evaluate(
-            &mut self.solver.balance,
-            self.context,
-            self.input.last,
-            &mut self.report,
-        )
+        let states = [self.input.last, at.u, at.u];
+        let balance = &mut self.solver.balance;
+        (at.det, _) = balance.residual(self.context, states, at.g, &mut self.report)?;
+        Ok(())
     }
 
     /// The first guess: the last state, the free motion of the natural modes, and the linear response to the tools, in parts of

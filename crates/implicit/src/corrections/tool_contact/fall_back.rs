@@ -20,7 +20,9 @@ impl ToolStep<'_> {
         at.u.copy_from_slice(&self.solver.fields.guess);
         // First candidate: the guess, pressed on until the tissue is out of the tools.
         let mut left = self.press_on(SUNK_MM, at.u)?;
-        self.keep(at)?;
+        // It stands if nothing better is found.
+        self.solver.fields.guess.copy_from_slice(at.u);
+        self.problem.kept.keep_guess(&self.problem.next)?;
         // Second: linear elasticity from rest, with no history but the tools' places; a guess that inverts elements makes the next step begin there.
         let has_time = !self.problem.work.is_late();
         if left > SUNK_MM && has_time && !self.guessed_from_rest {
@@ -30,7 +32,8 @@ impl ToolStep<'_> {
             let is_lost = self.problem.past.tools_push() && !self.problem.next.tools_push();
             if from_rest < left && !is_lost {
                 left = from_rest;
-                self.keep(at)?;
+                self.solver.fields.guess.copy_from_slice(at.u);
+                self.problem.kept.keep_guess(&self.problem.next)?;
             }
         }
         if left > SUNK_MM {
@@ -73,12 +76,6 @@ impl ToolStep<'_> {
         self.problem.kept.take_sound(&mut self.problem.next);
         at.u.copy_from_slice(&self.solver.fields.d);
         self.evaluate(at)
-    }
-
-    /// What stands if nothing better is found.
-    fn keep(&mut self, at: &Iterate<'_>) -> Result<()> {
-        self.solver.fields.guess.copy_from_slice(at.u);
-        self.problem.kept.keep_guess(&self.problem.next)
     }
 
     /// Linear elasticity from rest, with the tools where they are.

@@ -3,7 +3,7 @@
 //! The laws of the elements say nothing of what is inside out, so that no iteration leads out of it: a step that took such a state over would be the start of
 //! others (`docs/decisions/039-sound-states.md`).
 
-use super::{Iterate, LEAST_WAY_MM, ToolStep};
+use super::{Iterate, ToolStep};
 use crate::corrections::lift::lift;
 use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
@@ -72,16 +72,4 @@ impl ToolStep<'_> {
         let has_work = !self.problem.work.is_spent() && !self.problem.work.is_short();
         was_sound && !leapt && self.problem.past.tools_push() && has_work
     }
-}
-
-/// The last state, and from there half of the way of tools that move: the whole may lose them again.
-pub(super) fn begin_again_by_halves(step: &mut ToolStep<'_>, at: &mut Iterate<'_>) -> Result<()> {
-    step.begin_again(at)?;
-    if step.problem.ways.longest() <= LEAST_WAY_MM {
-        return Ok(());
-    }
-    step.begin_round(at)?;
-    step.improve_at(at, 0.5)?;
-    step.end_round(at)?;
-    step.evaluate(at)
 }

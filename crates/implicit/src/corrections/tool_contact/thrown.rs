@@ -12,25 +12,27 @@ use crate::error::Result;
 const THROWN: f64 = 2.0;
 const WORSE: f64 = 3.0;
 
-/// Begins with the last state, with the forces that it had, where the guess is much farther from balance; tells whether it does.
-pub(super) fn leave_thrown_guess(step: &mut ToolStep<'_>, at: &mut Iterate<'_>) -> Result<bool> {
-    let lies_still = step.problem.ways.longest() <= LEAST_WAY_MM;
-    if !lies_still || at.det < SMALLEST_DET || !step.may_begin_again() {
-        return Ok(false);
+impl ToolStep<'_> {
+    /// Begins with the last state, with the forces that it had, where the guess is much farther from balance; tells whether it does.
+    pub(super) fn leave_thrown_guess(&mut self, at: &mut Iterate<'_>) -> Result<bool> {
+        let lies_still = self.problem.ways.longest() <= LEAST_WAY_MM;
+        if !lies_still || at.det < SMALLEST_DET || !self.may_begin_again() {
+            return Ok(false);
+        }
+        let (guess, loads) = left_out(self, at);
+        if guess <= THROWN * loads {
+            return Ok(false);
+        }
+        self.begin_again(at)?;
+        let (last, _) = left_out(self, at);
+        if at.det >= SMALLEST_DET && guess > WORSE * last {
+            return Ok(true);
+        }
+        self.problem.kept.take_guess(&mut self.problem.next);
+        at.u.copy_from_slice(&self.solver.fields.guess);
+        self.evaluate(at)?;
+        Ok(false)
     }
-    let (guess, loads) = left_out(step, at);
-    if guess <= THROWN * loads {
-        return Ok(false);
-    }
-    step.begin_again(at)?;
-    let (last, _) = left_out(step, at);
-    if at.det >= SMALLEST_DET && guess > WORSE * last {
-        return Ok(true);
-    }
-    step.problem.kept.take_guess(&mut step.problem.next);
-    at.u.copy_from_slice(&step.solver.fields.guess);
-    step.evaluate(at)?;
-    Ok(false)
 }
 
 /// `|F(u) - B^T f|` and `|B^T f|` on the free nodes, µN.

@@ -79,13 +79,14 @@ impl ToolStep<'_> {
         }
         // A large move is worth an evaluation of all elements: it stands only if less is out of balance than before.
         let before = balance.size(env, left)?;
-        at.evaluate(balance, *context, input.last, report)?;
+        (at.det, _) = balance.residual(*context, [input.last, at.u, at.u], at.g, report)?;
         unbalanced(at.g, left);
         let after = balance.size(env, left)?;
         if at.det > SMALLEST_DET && after < before {
             return Ok(());
         }
         at.u.copy_from_slice(from);
-        at.evaluate(balance, *context, input.last, report)
+        (at.det, _) = balance.residual(*context, [input.last, at.u, at.u], at.g, report)?;
+        Ok(())
     }
 }
