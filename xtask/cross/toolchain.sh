@@ -63,7 +63,6 @@ if ! has_own && [ ! -e "$cross/rust/version" ] && command -v rustup >/dev/null; 
 fi
 case "$triple" in
   *-apple-darwin) source "$root/xtask/cross/macos.sh" ;;
-  x86_64-pc-windows-msvc) source "$root/xtask/cross/msvc.sh" ;;
 esac
 if ! has_own; then
   if [ ! -e "$cross/rust/version" ]; then
