@@ -80,7 +80,7 @@ pub use ::field::{error, grid};
 #[doc(hidden)]
 pub use implicit::{contact, corrections};
 
-pub use ::contact::{End as TieEnd, Sample as TiePoint, Shape, ShapeError, Spring, Tie, Vector};
+pub use ::contact::{End as TieEnd, Shape, ShapeError, Spring, Tie, TiePoint, Vector};
 #[doc(inline)]
 pub use ::field::{Error, Result};
 pub use contact::{ContactReport, MAX_TIES, MAX_TOOLS, Mode, Push, TieReading, Tool, ToolReading};

@@ -10,7 +10,7 @@ use super::structs::*;
 use crate::error::Error;
 use crate::features;
 use crate::scene::Bed;
-use ::contact::{End, Sample, Spring, Tie, Vector};
+use ::contact::{End, Spring, Tie, TiePoint, Vector};
 
 /// Places that one call finds points for at most.
 const MOST_POINTS: u64 = 1_000_000;
@@ -180,12 +180,12 @@ fn spring(stiffness: f32, slack_mm: f32, damping: f32, pushes: u8) -> Result<Spr
 }
 
 /// Weights that were never set are those of the first node.
-fn point(nodes: [u32; 3], weights: [f32; 3]) -> Sample {
+fn point(nodes: [u32; 3], weights: [f32; 3]) -> TiePoint {
     let weights = match weights == [0.0; 3] {
         true => [1.0, 0.0, 0.0],
         false => weights,
     };
-    Sample { nodes, weights }
+    TiePoint { nodes, weights }
 }
 
 /// A tie of the library's as a host's.

@@ -240,6 +240,8 @@ impl Link {
                 Some(_) => Vector::X,
                 None => outward(&self.near.samples, row, state),
             };
+            let samples = &self.near.samples;
+            snapshot.walls[at] = tie.is_none() && samples.is_wall(samples.face_of(row));
             snapshot.ties[at] = tie;
             snapshot.forces[at] = force;
             snapshot.anchors[at] = anchor;
@@ -257,6 +259,7 @@ impl Link {
                     put: false,
                     swept: true,
                     way_out: None,
+                    is_wall: snapshot.walls[at],
                 };
                 let pushed = force != Vector::ZERO;
                 let contact = pair.contact(point, point, snapshot.outward[at], force);
@@ -311,7 +314,7 @@ impl Link {
         let is_quick = ahead.length() > REACH_MM;
         let position = |node| vector(step.rest, node) + vector(step.u, node);
         // One that starts suddenly may be at the nearest part of the surface before the next state.
-        let nodes = self.near.samples.nodes().iter();
+        let nodes = self.near.samples.all_nodes().iter();
         let gaps = nodes.map(|node| self.tool.body.nearest_at(&pose, position(*node)).distance);
         let gap = gaps.fold(f32::MAX, f32::min);
         let gap = if gap <= PUT_MM { gap.max(0.0) } else { 0.0 };

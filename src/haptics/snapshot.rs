@@ -29,6 +29,8 @@ pub struct ContactSnapshot {
     pub followed_s: f64,
     /// The surface's normal there.
     pub outward: Vec<Vector>,
+    /// Whether they are on walls that a blade has laid open.
+    pub walls: Vec<bool>,
     /// Of the tool on the tissue, mN.
     pub forces: Vec<Vector>,
     /// Of a held one, its place on the tool.
@@ -68,6 +70,7 @@ impl ContactSnapshot {
             carried: vectors()?,
             followed_s: 0.0,
             outward: vectors()?,
+            walls: memory::filled(MOST_SAMPLES, false, WHAT)?,
             forces: vectors()?,
             anchors: memory::filled(MOST_SAMPLES, None, WHAT)?,
             ties: memory::filled(MOST_SAMPLES, None, WHAT)?,

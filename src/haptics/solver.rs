@@ -209,6 +209,7 @@ impl Solver {
                 put: false,
                 swept: true,
                 way_out: None,
+                is_wall: snapshot.walls[at],
             };
             let (point, start) = (
                 self.touched_at(snapshot, body, at, now),

@@ -258,9 +258,15 @@ impl Model {
             return Ok(Arc::clone(made));
         }
         let mesh = &self.mesh;
-        let made = ::contact::Samples::try_new(
+        let opened = &mesh.opened;
+        let made = ::contact::Samples::with_pieces(
             mesh.positions.as_chunks().0,
             mesh.domain_faces.as_chunks().0,
+            ::contact::Pieces {
+                corners: &opened.corners,
+                triangles: &opened.pieces,
+                first_wall: opened.first_wall,
+            },
             &mesh.held_nodes,
             ::contact::SPACING_MM,
         );

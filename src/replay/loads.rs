@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use ::contact::{End, Sample, Spring, Vector};
+use ::contact::{End, Spring, TiePoint, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::drive::Rows;
@@ -134,15 +134,15 @@ pub enum Far {
     Tissue(Point),
 }
 
-impl From<Sample> for Point {
-    fn from(Sample { nodes, weights }: Sample) -> Point {
+impl From<TiePoint> for Point {
+    fn from(TiePoint { nodes, weights }: TiePoint) -> Point {
         Point { nodes, weights }
     }
 }
 
-impl From<Point> for Sample {
-    fn from(Point { nodes, weights }: Point) -> Sample {
-        Sample { nodes, weights }
+impl From<Point> for TiePoint {
+    fn from(Point { nodes, weights }: Point) -> TiePoint {
+        TiePoint { nodes, weights }
     }
 }
 

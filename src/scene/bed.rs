@@ -1,6 +1,6 @@
 //! Ties for a host: the point of the surface nearest to a place, and a bed, many ties over a region made at once.
 
-use ::contact::{End, Sample, Spring, Tie, Vector, nearest};
+use ::contact::{End, Spring, Tie, TiePoint, Vector, nearest};
 
 use super::Scene;
 use super::published::lock_read;
@@ -30,7 +30,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::NonFinite`], [`Error::Argument`] for a bundle without a domain, [`Error::Unsupported`] for a cut body.
-    pub fn tie_point(&self, place: [f32; 3]) -> Result<Sample> {
+    pub fn tie_point(&self, place: [f32; 3]) -> Result<TiePoint> {
         let place = Vector::from(place);
         if !place.is_finite() {
             return Err(Error::NonFinite(format!("the place {place}")));
@@ -103,7 +103,7 @@ impl Scene {
         let tie = |node: u32| {
             let share = area[node as usize] / whole;
             Tie {
-                point: Sample {
+                point: TiePoint {
                     nodes: [node; 3],
                     weights: [1.0, 0.0, 0.0],
                 },

@@ -2,7 +2,7 @@
 //!
 //! REQ-072: A tie pulls as its spring does, and once broken stays so.
 
-use ::contact::{End, Sample, Tie, Vector};
+use ::contact::{End, Tie, TiePoint, Vector};
 
 use super::StepInput;
 use super::body::SceneBody;
@@ -13,7 +13,7 @@ use crate::memory;
 const WHAT: &str = "the ties of a scene";
 
 /// The points of the tissue that a tie has.
-fn points_of(tie: &Tie) -> impl Iterator<Item = Sample> {
+fn points_of(tie: &Tie) -> impl Iterator<Item = TiePoint> {
     let far = match tie.end {
         End::Tissue(far) => Some(far),
         _ => None,
@@ -35,7 +35,7 @@ pub(super) fn place(
     let (prior, held) = (&body.model.prior, &body.held);
     // A place in the list that holds nothing may name tissue that is gone.
     let is_idle = |node: u32| {
-        let has = |point: &Sample| point.entries().any(|(own, _)| own == node);
+        let has = |point: &TiePoint| point.entries().any(|(own, _)| own == node);
         let mut of_it = given
             .iter()
             .filter(|tie| points_of(tie).any(|point| has(&point)));
@@ -48,7 +48,7 @@ pub(super) fn place(
     };
     let count = body.intact_mesh().node_count();
     for (index, tie) in given.iter().enumerate() {
-        let is_gone = |point: &Sample| {
+        let is_gone = |point: &TiePoint| {
             let mut nodes = point.entries().map(|(node, _)| node);
             nodes.all(|node| (node as usize) < count && body.is_gone(node))
         };

@@ -136,6 +136,24 @@ fn a_tool_presses_beside_a_slit_and_on_its_lip() {
     assert!(mean < 0.005 && force < 0.08, "{mean} mm², {force}");
 }
 
+/// A ball goes into a slit from above, and pushes one of its walls aside: all of that force is from walls, which have samples inside of elements.
+#[test]
+fn a_tool_in_a_slit_parts_its_walls() {
+    let model = liver();
+    let scene = Scene::new(std::sync::Arc::clone(&model), &options()).unwrap();
+    let (_, normal) = site(&scene);
+    let across = normal.cross(normal.any_orthonormal_vector());
+    let into = |depth: f32, aside: f32| (None, pressing(&scene, depth, across * aside));
+    let down = (0..8).map(|at| into(1.0 * at as f32 - 1.0, 0.0));
+    let aside = (0..14).map(|at| into(6.0, 0.5 * (at.min(8) as f32)));
+    let mut frames: Vec<Frame> = down.chain(aside).collect();
+    frames[0].0 = Some(Operation::Cut(slit(&scene, 0.0, 15.0)));
+    let found = compare(&model, "onnx/liver-coarse/mesh.safetensors", &frames);
+    println!("{found:?}");
+    let (mean, force) = errors(&found);
+    assert!(mean < 0.02 && force < 0.1, "{mean} mm², {force}");
+}
+
 #[test]
 fn tissue_tears_under_the_tool() {
     let model = liver();

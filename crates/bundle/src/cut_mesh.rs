@@ -1,10 +1,8 @@
 //! The mesh of a body that has been cut.
 
-use std::sync::OnceLock;
-
 use topology::{Body, Changes};
 
-use super::mesh::{Mesh, unique};
+use super::mesh::{Mesh, Opened, unique};
 use super::node_set::NodeSet;
 use field::error::Result;
 use field::memory;
@@ -63,8 +61,10 @@ impl Mesh {
             stiffness.push(self.stiffness_of(element));
             region.extend(self.region.get(element.parent as usize));
         }
-        let faces = body.touchable_of(self.domain_sides(body)?)?;
-        let domain_faces = memory::copied(faces.as_flattened(), WHAT)?;
+        let touchable = body.touchable_of(self.domain_sides(body)?)?;
+        let domain_faces = memory::copied(touchable.faces.as_flattened(), WHAT)?;
+        let most = domain_faces.len() + 4 * touchable.corners.len();
+        let domain_nodes = memory::collected(most, touchable.nodes(), WHAT)?;
         let mut left = memory::room(4 * new.len(), WHAT)?;
         left.extend(new.iter().flat_map(|element| element.nodes));
         let left = unique(left);
@@ -97,7 +97,7 @@ impl Mesh {
             region,
             laws: memory::collected(self.laws.len(), self.laws.iter().cloned(), WHAT)?,
             surface_faces: memory::copied(&self.surface_faces, WHAT)?,
-            domain_nodes: unique(memory::copied(&domain_faces, WHAT)?),
+            domain_nodes: unique(domain_nodes),
             domain_faces,
             surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
             held_nodes: unique(held_nodes),
@@ -105,7 +105,12 @@ impl Mesh {
             regions: Vec::new(),
             node_area,
             sha256: self.sha256.clone(),
-            domain_sides: OnceLock::new(),
+            opened: Opened {
+                corners: touchable.corners,
+                pieces: touchable.pieces,
+                first_wall: touchable.first_wall,
+                ..Opened::default()
+            },
         })
     }
 
@@ -116,7 +121,7 @@ impl Mesh {
     }
 
     fn domain_sides(&self, body: &Body) -> Result<&[(u32, u8)]> {
-        if let Some(sides) = self.domain_sides.get() {
+        if let Some(sides) = self.opened.domain_sides.get() {
             return Ok(sides);
         }
         let mut domain = memory::room(self.domain_faces.len() / 3, WHAT)?;
@@ -127,6 +132,6 @@ impl Mesh {
         }
         domain.sort_unstable();
         let sides = (body.mesh()).border(|corners| domain.binary_search(&corners).is_ok())?;
-        Ok(self.domain_sides.get_or_init(|| sides))
+        Ok(self.opened.domain_sides.get_or_init(|| sides))
     }
 }

@@ -31,11 +31,11 @@ pub struct Mesh {
     pub laws: Vec<elements::Region>,
     /// Boundary triangles `[F,3]`, outward.
     pub surface_faces: Vec<u32>,
-    /// Triangles of the domain `[D,3]`.
+    /// Triangles of the domain `[D,3]`; of a cut body those that are whole.
     pub domain_faces: Vec<u32>,
     /// Nodes of the boundary triangles, ascending.
     pub surface_nodes: Vec<u32>,
-    /// Nodes of the domain's triangles, ascending.
+    /// Nodes of the domain's triangles, and of what has been laid open, ascending.
     pub domain_nodes: Vec<u32>,
     /// Nodes held at zero, ascending.
     pub held_nodes: Vec<u32>,
@@ -47,9 +47,22 @@ pub struct Mesh {
     pub node_area: Vec<f32>,
     /// The mesh hash of `docs/reference/formats.md`.
     pub sha256: String,
+    /// What a blade has laid open.
+    pub opened: Opened,
+}
+
+/// What of a cut body's domain is not whole faces ([`topology::Touchable`]), and what a cut looks at.
+#[derive(Debug, Default, HeldBytes)]
+pub struct Opened {
     /// The domain's triangles as faces of elements, from the first cut on.
     #[held(skip)]
     pub(super) domain_sides: OnceLock<Vec<(u32, u8)>>,
+    /// Corners of the pieces: nodes and weights.
+    pub corners: Vec<([u32; 4], [f32; 4])>,
+    /// Triangles, outward.
+    pub pieces: Vec<[u32; 3]>,
+    /// Those from here on are walls: a blade has gone through elements there.
+    pub first_wall: usize,
 }
 
 impl Mesh {
@@ -145,7 +158,7 @@ impl Mesh {
             surface_faces,
             domain_faces,
             sha256: hex(&hash.finalize()),
-            domain_sides: OnceLock::new(),
+            opened: Opened::default(),
             supports: Vec::new(),
             regions: Vec::new(),
         })

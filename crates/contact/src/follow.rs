@@ -1,6 +1,7 @@
 //! Samples of a surface that has changed: those at the same points of the tissue.
 
-use crate::samples::{Sample, Samples};
+use crate::sample::Sample;
+use crate::samples::Samples;
 use std::collections::{HashMap, TryReserveError};
 
 /// Weights that differ by less are the same.
@@ -19,7 +20,7 @@ pub fn followed(
     let mut found = Vec::new();
     found.try_reserve_exact(rows.len())?;
     found.resize(rows.len(), None);
-    let mut wanted: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
+    let mut wanted: HashMap<[u32; 4], Vec<usize>> = HashMap::new();
     wanted.try_reserve(rows.len())?;
     for (at, row) in rows.iter().enumerate() {
         let (nodes, _) = sorted(&before.at(*row));
@@ -38,8 +39,8 @@ pub fn followed(
 }
 
 /// Nodes, ascending, with their weights; what is not needed is no node.
-fn sorted(sample: &Sample) -> ([u32; 3], [f32; 3]) {
-    let mut parts = [(u32::MAX, 0.0); 3];
+fn sorted(sample: &Sample) -> ([u32; 4], [f32; 4]) {
+    let mut parts = [(u32::MAX, 0.0); 4];
     for (part, entry) in parts.iter_mut().zip(sample.entries()) {
         *part = entry;
     }

@@ -1,6 +1,6 @@
 //! The point of a surface that lies nearest to a place.
 
-use crate::samples::Sample;
+use crate::tie::TiePoint;
 use parry3d::math::Vector;
 use parry3d::query::PointQueryWithLocation;
 use parry3d::shape::Triangle;
@@ -10,9 +10,9 @@ pub fn nearest(
     faces: impl Iterator<Item = [u32; 3]>,
     position: impl Fn(u32) -> Vector,
     place: Vector,
-) -> Option<Sample> {
+) -> Option<TiePoint> {
     // All faces are looked at: this is asked where a host sets a tie, and never in a step.
-    let mut found: Option<(f32, Sample)> = None;
+    let mut found: Option<(f32, TiePoint)> = None;
     for nodes in faces {
         let [a, b, c] = nodes.map(&position);
         // `false`: the surface itself is meant, not the solid behind it.
@@ -23,7 +23,7 @@ pub fn nearest(
         }
         // A flat triangle has no weights: its first corner then.
         let weights = at.barycentric_coordinates().unwrap_or([1.0, 0.0, 0.0]);
-        found = Some((distance, Sample { nodes, weights }));
+        found = Some((distance, TiePoint { nodes, weights }));
     }
     found.map(|(_, sample)| sample)
 }

@@ -1,13 +1,17 @@
 //! Where contact is looked at: points on the nodes, edges and faces of the touchable surface.
 //!
-//! A sample is a fixed combination of at most three nodes, a row of `B`: its displacement is `B u`, and a force `f` on it is
-//! `B^T f` on the nodes. Neighbours are at most [`SPACING_MM`] apart at rest, and each point occurs once: an edge's
-//! samples belong to the first face that has it. Positions, faces and spacing alone decide the samples and their order, so
-//! the reference solver and the runtime see the same ones.
+//! A sample is a fixed combination of at most four nodes, a row of `B`: its displacement is `B u`, and a force `f` on it is
+//! `B^T f` on the nodes. On faces of elements it has three at most; where a blade has gone through elements it lies inside of one. Neighbours are at most
+//! [`SPACING_MM`] apart at rest, and each point occurs once: an edge's samples belong to the first face that has it. Positions, faces and spacing alone
+//! decide the samples and their order, so the reference solver and the runtime see the same ones.
 //!
 //! A thin tool passes between samples, and a thicker one where the tissue is stretched. There a finer *lattice* of points is
 //! touched too, [`LATTICE`] parts to an edge, whose rows are numbered after those of the samples and computed when asked for ([`Samples::at`], [`Samples::lattice_row`]).
 
+mod build;
+
+use crate::sample::{Sample, between};
+use build::{Builder, faces_at};
 use parry3d::math::Vector;
 use std::collections::{HashSet, TryReserveError};
 
@@ -20,38 +24,39 @@ pub const LATTICE: u32 = 64;
 /// Numbers that a face's lattice takes up; those with `i + j > LATTICE` name no point.
 const PER_FACE: u32 = (LATTICE + 1) * (LATTICE + 1);
 
-/// A point of the surface: nodes and weights that sum to 1. Unused places repeat the first node with weight 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
-    pub nodes: [u32; 3],
-    pub weights: [f32; 3],
+/// What of a surface is not whole faces of elements, because a blade has gone through them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pieces<'a> {
+    /// Nodes of one element and weights, as those of a [`Sample`].
+    pub corners: &'a [([u32; 4], [f32; 4])],
+    /// Corners of each triangle, outward.
+    pub triangles: &'a [[u32; 3]],
+    /// Triangles from here on are walls: a blade has gone through elements there.
+    pub first_wall: usize,
 }
 
-impl Sample {
-    /// The sample's value of a nodal field: positions, displacements, velocities.
-    #[inline]
-    pub fn gather(&self, field: impl Fn(u32) -> Vector) -> Vector {
-        let [a, b, c] = self.nodes;
-        let [u, v, w] = self.weights;
-        field(a) * u + field(b) * v + field(c) * w
-    }
-
-    /// Nodes with a weight that is not zero, with it.
-    pub fn entries(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
-        let entries = self.nodes.iter().copied().zip(self.weights);
-        entries.filter(|(_, weight)| *weight != 0.0)
-    }
+/// Corners that are no nodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Inner {
+    /// They follow the nodes in the numbers of places.
+    points: Vec<Sample>,
+    /// Nodes of faces and of `points`, ascending; none where there are no `points`.
+    nodes: Vec<u32>,
+    /// Faces from here on are walls.
+    first_wall: usize,
 }
 
 /// All samples of a surface, grouped by face.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
     rows: Vec<Sample>,
-    /// Distinct nodes of the faces, ascending.
+    /// Distinct nodes that are corners of faces, ascending.
     nodes: Vec<u32>,
-    /// Places in `nodes` of each face's corners.
+    /// Corners that are no nodes: places from `nodes.len()` on.
+    inner: Inner,
+    /// Places of each face's corners.
     corners: Vec<[u32; 3]>,
-    /// Faces at the node in place `n`, ascending: `around[starts[n]..starts[n + 1]]`.
+    /// Faces at the corner in place `n`, ascending: `around[starts[n]..starts[n + 1]]`.
     around: Vec<u32>,
     starts: Vec<u32>,
     /// Samples of face `f` are `rows[offsets[f]..offsets[f + 1]]`.
@@ -92,38 +97,90 @@ impl Samples {
         held: &[u32],
         spacing_mm: f32,
     ) -> Result<Self, TryReserveError> {
+        Self::with_pieces(positions, faces, Pieces::default(), held, spacing_mm)
+    }
+
+    /// The same with what is not whole faces: these follow.
+    ///
+    /// Panics when a face or a corner names a node that `positions` does not have.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn with_pieces(
+        positions: &[[f32; 3]],
+        faces: &[[u32; 3]],
+        pieces: Pieces<'_>,
+        held: &[u32],
+        spacing_mm: f32,
+    ) -> Result<Self, TryReserveError> {
         let (mut nodes, mut corners, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
-        nodes.try_reserve_exact(3 * faces.len())?;
-        corners.try_reserve_exact(faces.len())?;
-        offsets.try_reserve_exact(faces.len() + 1)?;
+        let count = faces.len() + pieces.triangles.len();
+        nodes.try_reserve_exact(3 * faces.len() + pieces.corners.len())?;
+        corners.try_reserve_exact(count)?;
+        offsets.try_reserve_exact(count + 1)?;
         nodes.extend_from_slice(faces.as_flattened());
+        // A corner with one node is that node.
+        let is_node = |weights: &[f32; 4]| weights[1..] == [0.0; 3];
+        let single = pieces.corners.iter().filter(|corner| is_node(&corner.1));
+        nodes.extend(single.map(|corner| corner.0[0]));
         nodes.sort_unstable();
         nodes.dedup();
         let place = |node: u32| nodes.partition_point(|n| *n < node) as u32;
         corners.extend(faces.iter().map(|face| face.map(place)));
-        let (starts, around) = faces_at_nodes(&corners, nodes.len())?;
+        let mut inner = Inner {
+            first_wall: faces.len() + pieces.first_wall,
+            ..Inner::default()
+        };
+        let mut places = Vec::new();
+        places.try_reserve_exact(pieces.corners.len())?;
+        inner.points.try_reserve_exact(pieces.corners.len())?;
+        for &(own, weights) in pieces.corners {
+            places.push(match is_node(&weights) {
+                true => place(own[0]),
+                false => {
+                    inner.points.push(Sample {
+                        nodes: own,
+                        weights,
+                    });
+                    (nodes.len() + inner.points.len() - 1) as u32
+                }
+            });
+        }
+        corners.extend((pieces.triangles.iter()).map(|own| own.map(|at| places[at as usize])));
+        if !inner.points.is_empty() {
+            let all = nodes.len() + 4 * inner.points.len();
+            inner.nodes.try_reserve_exact(all)?;
+            inner.nodes.extend_from_slice(&nodes);
+            let of_points = inner.points.iter().flat_map(|point| point.nodes);
+            inner.nodes.extend(of_points);
+            inner.nodes.sort_unstable();
+            inner.nodes.dedup();
+        }
+        let (starts, around) = faces_at(&corners, nodes.len() + inner.points.len())?;
         let mut builder = Builder {
             positions,
+            corners: (&nodes, &inner.points),
             spacing: f64::from(spacing_mm),
             held: HashSet::new(),
-            seen_nodes: HashSet::new(),
+            seen_corners: HashSet::new(),
             seen_edges: HashSet::new(),
             rows: Vec::new(),
         };
         builder.held.try_reserve(held.len())?;
         builder.held.extend(held);
-        builder.seen_nodes.try_reserve(nodes.len())?;
-        builder.seen_edges.try_reserve(3 * faces.len())?;
+        builder.seen_corners.try_reserve(starts.len())?;
+        builder.seen_edges.try_reserve(3 * count)?;
         let mut parts = Vec::new();
-        parts.try_reserve_exact(faces.len())?;
+        parts.try_reserve_exact(count)?;
         offsets.push(0);
-        for face in faces {
+        for face in &corners {
             parts.push(builder.face(*face)?.min(usize::from(u16::MAX)) as u16);
             offsets.push(builder.rows.len() as u32);
         }
         Ok(Self {
             rows: builder.rows,
             nodes,
+            inner,
             corners,
             around,
             starts,
@@ -162,10 +219,12 @@ impl Samples {
             None => {
                 let (face, [i, j]) = self.lattice_place(row);
                 let part = |n: u32| n as f32 / LATTICE as f32;
-                Sample {
-                    nodes: self.corners[face].map(|place| self.nodes[place as usize]),
-                    weights: [part(LATTICE - i - j), part(i), part(j)],
-                }
+                let weights = [part(LATTICE - i - j), part(i), part(j)];
+                between(
+                    (&self.nodes, &self.inner.points),
+                    self.corners[face],
+                    weights,
+                )
             }
         }
     }
@@ -207,9 +266,36 @@ impl Samples {
         self.rows.is_empty()
     }
 
-    /// Distinct nodes of the sampled faces, ascending.
+    /// Distinct nodes that are corners of the sampled faces, ascending.
     pub fn nodes(&self) -> &[u32] {
         &self.nodes
+    }
+
+    /// Distinct nodes that samples have, ascending: those of corners, and those around corners that are no nodes.
+    pub fn all_nodes(&self) -> &[u32] {
+        match self.inner.nodes.is_empty() {
+            true => &self.nodes,
+            false => &self.inner.nodes,
+        }
+    }
+
+    /// Corners that are no nodes: their places follow those of the nodes.
+    pub fn inner_corners(&self) -> &[Sample] {
+        &self.inner.points
+    }
+
+    /// Where the corner in a place is; `position` gives a node's.
+    #[inline]
+    pub fn corner_at(&self, place: u32, position: impl Fn(u32) -> Vector) -> Vector {
+        match self.nodes.get(place as usize) {
+            Some(node) => position(*node),
+            None => self.inner.points[place as usize - self.nodes.len()].gather(position),
+        }
+    }
+
+    /// Whether a face is a wall that a blade has laid open.
+    pub fn is_wall(&self, face: usize) -> bool {
+        face >= self.inner.first_wall
     }
 
     /// Number of sampled faces.
@@ -217,12 +303,12 @@ impl Samples {
         self.corners.len()
     }
 
-    /// Places in [`Samples::nodes`] of a face's corners.
+    /// Places of a face's corners: of [`Samples::nodes`], and then of [`Samples::inner_corners`].
     pub fn corners(&self, face: usize) -> [u32; 3] {
         self.corners[face]
     }
 
-    /// Faces with a corner at a place in [`Samples::nodes`], ascending.
+    /// Faces with a corner at a place, ascending.
     pub fn faces_at(&self, place: u32) -> &[u32] {
         let [from, to] = [place, place + 1].map(|n| self.starts[n as usize] as usize);
         &self.around[from..to]
@@ -245,96 +331,5 @@ impl Samples {
     /// Samples that belong to a face, as a range of [`Samples::rows`].
     pub fn of_face(&self, face: usize) -> std::ops::Range<usize> {
         self.offsets[face] as usize..self.offsets[face + 1] as usize
-    }
-}
-
-/// Where the faces of each node start in a list by node, and that list.
-fn faces_at_nodes(
-    corners: &[[u32; 3]],
-    nodes: usize,
-) -> Result<(Vec<u32>, Vec<u32>), TryReserveError> {
-    let (mut starts, mut around) = (Vec::new(), Vec::new());
-    starts.try_reserve_exact(nodes + 1)?;
-    around.try_reserve_exact(3 * corners.len())?;
-    starts.resize(nodes + 1, 0);
-    around.resize(3 * corners.len(), 0);
-    for place in corners.as_flattened() {
-        starts[*place as usize] += 1;
-    }
-    let mut end = 0;
-    for start in &mut starts {
-        end += *start;
-        *start = end;
-    }
-    // From the last face back: each goes before the one that is there.
-    for (face, corners) in corners.iter().enumerate().rev() {
-        for place in corners {
-            let at = &mut starts[*place as usize];
-            *at -= 1;
-            around[*at as usize] = face as u32;
-        }
-    }
-    Ok((starts, around))
-}
-
-struct Builder<'a> {
-    positions: &'a [[f32; 3]],
-    spacing: f64,
-    held: HashSet<u32>,
-    seen_nodes: HashSet<u32>,
-    seen_edges: HashSet<(u32, u32)>,
-    rows: Vec<Sample>,
-}
-
-impl Builder<'_> {
-    /// Gives the parts that it makes of the longest edge.
-    fn face(&mut self, face: [u32; 3]) -> Result<usize, TryReserveError> {
-        for node in face {
-            if self.seen_nodes.insert(node) {
-                self.push([node; 3], [1.0, 0.0, 0.0])?;
-            }
-        }
-        let mut longest = 0.0f64;
-        for k in 0..3 {
-            let (a, b) = (face[k], face[(k + 1) % 3]);
-            // By node number, so that an edge looks the same from both sides.
-            let (a, b) = (a.min(b), a.max(b));
-            let length = self.length(a, b);
-            longest = longest.max(length);
-            if self.seen_edges.insert((a, b)) {
-                let parts = self.parts(length);
-                for i in 1..parts {
-                    let t = i as f32 / parts as f32;
-                    self.push([a, b, a], [1.0 - t, t, 0.0])?;
-                }
-            }
-        }
-        let parts = self.parts(longest);
-        let part = |i: usize| i as f32 / parts as f32;
-        for i in 1..parts {
-            for j in 1..parts - i {
-                self.push(face, [part(parts - i - j), part(i), part(j)])?;
-            }
-        }
-        Ok(parts)
-    }
-
-    fn push(&mut self, nodes: [u32; 3], weights: [f32; 3]) -> Result<(), TryReserveError> {
-        let sample = Sample { nodes, weights };
-        if sample.entries().any(|(node, _)| !self.held.contains(&node)) {
-            self.rows.try_reserve(1)?;
-            self.rows.push(sample);
-        }
-        Ok(())
-    }
-
-    fn length(&self, a: u32, b: u32) -> f64 {
-        let (a, b) = (self.positions[a as usize], self.positions[b as usize]);
-        let square = |k: usize| (f64::from(a[k]) - f64::from(b[k])).powi(2);
-        (square(0) + square(1) + square(2)).sqrt()
-    }
-
-    fn parts(&self, length: f64) -> usize {
-        (length / self.spacing).ceil().max(1.0) as usize
     }
 }

@@ -43,7 +43,7 @@ pub struct Candidate {
 /// A search's buffers.
 #[derive(Clone, Debug, Default)]
 pub struct Search {
-    /// By place in `Samples::nodes`: sides of the box that the node is beyond.
+    /// By place of a corner: sides of the box that it is beyond.
     beyond: Vec<u8>,
     /// Points of the lattice, which follow the samples.
     between: Vec<Candidate>,
@@ -57,7 +57,8 @@ impl Search {
     /// No memory.
     pub fn with_room(samples: &Samples) -> Result<Self, TryReserveError> {
         let mut search = Self::default();
-        search.beyond.try_reserve_exact(samples.nodes().len())?;
+        let corners = samples.nodes().len() + samples.inner_corners().len();
+        search.beyond.try_reserve_exact(corners)?;
         // A point of the lattice a face.
         search.between.try_reserve_exact(samples.face_count())?;
         search
@@ -84,11 +85,13 @@ impl Search {
             self.between.clear();
             let (low, high) = tool.body.bounds(&tool.pose, tool.skin);
             self.beyond.clear();
-            let sides = |node: &u32| {
-                let p = position(*node);
-                p.cmplt(low).bitmask() as u8 | (p.cmpgt(high).bitmask() as u8) << 3
-            };
-            self.beyond.extend(samples.nodes().iter().map(sides));
+            let sides =
+                |p: Vector| p.cmplt(low).bitmask() as u8 | (p.cmpgt(high).bitmask() as u8) << 3;
+            let nodes = samples.nodes().iter();
+            self.beyond.extend(nodes.map(|node| sides(position(*node))));
+            let inner = samples.inner_corners().iter();
+            self.beyond
+                .extend(inner.map(|corner| sides(corner.gather(&position))));
             for face in 0..samples.face_count() {
                 let [a, b, c] = samples.corners(face).map(|n| self.beyond[n as usize]);
                 if a & b & c != 0 || is_far(samples, face, tool, &position) {
@@ -134,7 +137,7 @@ fn candidate(tool: usize, sample: u32, point: Vector, nearest: Nearest) -> Candi
 /// Whether no point of a face is within a tool's skin: distance changes by no more than the way.
 fn is_far(samples: &Samples, face: usize, tool: &Placed, position: impl Fn(u32) -> Vector) -> bool {
     let corners = samples.corners(face);
-    let corners = corners.map(|place| position(samples.nodes()[place as usize]));
+    let corners = corners.map(|place| samples.corner_at(place, &position));
     let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
     let farthest = corners.map(|corner| corner.distance(middle));
     let farthest = farthest.into_iter().fold(ROUNDING_MM, f32::max);
@@ -157,7 +160,7 @@ fn nearest_of_face(
     const WAYS: [[i32; 2]; 6] = [[1, 0], [-1, 0], [0, 1], [0, -1], [1, -1], [-1, 1]];
     let [a, b, c] = samples
         .corners(face)
-        .map(|place| position(samples.nodes()[place as usize]));
+        .map(|place| samples.corner_at(place, &position));
     let longest = (b - a).length().max((c - a).length()).max((c - b).length());
     let spacing = samples.spacing(face, longest)?;
     if !tool.body.sinks_between(spacing) {

@@ -9,7 +9,7 @@
 //! while it is taut (`l > s`), and where it pushes too, always; without pushing `T >= 0`. Over an implicit step the rate is the change of length since its
 //! start, or since it became taut, over the step's time, so that the tension never falls where the length grows ([`Pull`]). mm, mN, s; mN/mm is N/m.
 
-use crate::samples::Sample;
+use crate::sample::Sample;
 use parry3d::math::{Matrix, Vector};
 
 /// The largest stiffness (N/m), and the largest damping (N s/m): beyond, the length of a tie is known less well than its tension.
@@ -21,6 +21,32 @@ const SETTLED: f32 = 1e-6;
 /// A tie that is shorter has no direction, mm.
 const SHORT_MM: f32 = 1e-6;
 
+/// A point on a face of the tissue: nodes and weights that sum to 1. Unused places repeat the first node with weight 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TiePoint {
+    pub nodes: [u32; 3],
+    pub weights: [f32; 3],
+}
+
+impl TiePoint {
+    /// The point's value of a nodal field.
+    pub fn gather(&self, field: impl Fn(u32) -> Vector) -> Vector {
+        Sample::from(*self).gather(field)
+    }
+
+    /// Nodes with a weight that is not zero, with it.
+    pub fn entries(&self) -> impl Iterator<Item = (u32, f32)> + '_ {
+        let entries = self.nodes.iter().copied().zip(self.weights);
+        entries.filter(|(_, weight)| *weight != 0.0)
+    }
+}
+
+impl From<TiePoint> for Sample {
+    fn from(point: TiePoint) -> Sample {
+        Sample::on_face(point.nodes, point.weights)
+    }
+}
+
 /// Where the far end of a tie is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum End {
@@ -31,7 +57,7 @@ pub enum End {
     /// A place in the frame of a tool.
     Tool { tool: u32, place: Vector },
     /// Another point of the tissue.
-    Tissue(Sample),
+    Tissue(TiePoint),
 }
 
 /// How a tie pulls.
@@ -51,7 +77,7 @@ pub struct Spring {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tie {
     /// The point of the tissue.
-    pub point: Sample,
+    pub point: TiePoint,
     pub end: End,
     pub spring: Spring,
     /// It breaks under a larger tension, mN; 0: never.
@@ -122,7 +148,7 @@ impl Tie {
     }
 }
 
-fn check_weights(field: &str, sample: &Sample) -> Result<(), String> {
+fn check_weights(field: &str, sample: &TiePoint) -> Result<(), String> {
     let sum: f32 = sample.weights.iter().sum();
     match (sum - 1.0).abs() <= 1e-3 && sample.weights.iter().all(|weight| *weight >= 0.0) {
         true => Ok(()),

@@ -1,6 +1,6 @@
 //! Samples cover the surface, each once, and a search finds all that are near.
 
-use contact::{Body, Grasp, Placed, Pose, Samples, Search, Shape, Vector};
+use contact::{Body, Grasp, Pieces, Placed, Pose, Samples, Search, Shape, Vector};
 use std::collections::HashSet;
 
 /// A wavy sheet of `n x n` squares of `edge` mm, its diagonals alternating.
@@ -175,4 +175,63 @@ fn a_grasp_holds_what_is_in_reach_until_it_is_pulled_too_hard() {
     );
     assert!(grasp.tear(Vector::new(0.0, 40.0, 40.0), 50.0));
     assert!(grasp.anchors().is_empty());
+}
+
+/// Two elements' walls over a square of 6 mm at height 2.5: each corner halfway between a node below and one above.
+#[test]
+fn walls_have_samples_inside_of_elements() {
+    let square = [[0.0, 0.0], [6.0, 0.0], [6.0, 6.0], [0.0, 6.0]];
+    let at = |height: f32| square.map(|[x, y]| [x, y, height]);
+    let positions = [at(0.0), at(5.0)].concat();
+    let corners: Vec<([u32; 4], [f32; 4])> = (0..4)
+        .map(|at| ([at, at + 4, at, at], [0.5, 0.5, 0.0, 0.0]))
+        .collect();
+    // The first piece is a part of the border, by three nodes.
+    let single = [4, 5, 6].map(|node| ([node; 4], [1.0, 0.0, 0.0, 0.0]));
+    let corners = [corners, single.to_vec()].concat();
+    let pieces = Pieces {
+        corners: &corners,
+        triangles: &[[4, 5, 6], [0, 1, 2], [0, 2, 3]],
+        first_wall: 1,
+    };
+    let made = Samples::with_pieces(&positions, &[[4, 6, 7]], pieces, &[], 1.7);
+    let samples = made.unwrap();
+    assert_eq!(
+        (samples.nodes(), samples.all_nodes().len()),
+        (&[4, 5, 6, 7][..], 8)
+    );
+    assert_eq!(samples.inner_corners().len(), 4);
+    let walls: Vec<bool> = (0..4).map(|face| samples.is_wall(face)).collect();
+    assert_eq!(walls, [false, false, true, true]);
+    // The nodes below go up by 1: the wall by half of it, the border not at all.
+    let moved = |node: u32| point(&positions, node) + Vector::Z * f32::from(u8::from(node < 4));
+    for face in 0..4 {
+        let height = if face < 2 { 5.0 } else { 3.0 };
+        assert!(samples.of_face(face).len() > 3);
+        for row in samples.of_face(face) {
+            let sample = samples.at(row as u32);
+            let weights: f32 = sample.weights.iter().sum();
+            assert!((weights - 1.0).abs() < 1e-5 && samples.face_of(row as u32) == face);
+            assert!((sample.gather(moved).z - height).abs() < 1e-5, "{sample:?}");
+        }
+        for row in samples.of_face(face).chain([0]) {
+            let next = samples.lattice_row(face, [7, row as u32 % 50]).unwrap();
+            assert_eq!(samples.face_of(next), face);
+            let sample = samples.at(next);
+            assert!((sample.gather(moved).z - height).abs() < 1e-5, "{sample:?}");
+        }
+    }
+    // A ball on the wall finds it, and what is held does not count.
+    let ball = Body::new(&Shape::Sphere { radius: 1.0 }).unwrap();
+    let placed = Placed {
+        body: &ball,
+        pose: Pose::from_translation(Vector::new(3.0, 3.0, 3.2)),
+        skin: 0.5,
+    };
+    let mut search = Search::with_room(&samples).unwrap();
+    let found = search.find(&samples, &[placed], |node| point(&positions, node));
+    assert!(found.len() > 3 && found.iter().all(|near| (near.point.z - 2.5).abs() < 1e-5));
+    let held: Vec<u32> = (0..8).collect();
+    let none = Samples::with_pieces(&positions, &[[4, 6, 7]], pieces, &held, 1.7).unwrap();
+    assert!(none.is_empty());
 }

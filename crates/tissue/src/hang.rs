@@ -2,7 +2,7 @@
 
 use crate::mesh::{Boundary, Mesh, face_area, face_centroid, face_normal};
 use crate::schemes::SplitMix;
-use contact::{End, Sample, Spring, Tie, Vector};
+use contact::{End, Spring, Tie, TiePoint, Vector};
 
 /// How large a bed is and how hard it is pulled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,7 +87,7 @@ impl Hang {
             let pulled = *nodes.iter().min_by(near)?;
             let whole: f32 = nodes.iter().map(|node| area[*node as usize]).sum();
             let tie = |node: u32, stiffness: f32, break_mn: f32| Tie {
-                point: Sample {
+                point: TiePoint {
                     nodes: [node; 3],
                     weights: [1.0, 0.0, 0.0],
                 },

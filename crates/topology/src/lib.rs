@@ -16,7 +16,7 @@
 //! | [`blade`] | what a blade feels |
 //! | `tear` | what is stretched too far |
 //! | `carry` | which nodes take what acts on a node of the mesh |
-//! | `touchable` | faces that tools may touch |
+//! | `touchable` | where tools may touch |
 //!
 //! Lengths are millimetres. Nothing here knows an element law or a time.
 //!
@@ -52,6 +52,7 @@ pub use push::Push;
 pub use rest::RestMesh;
 pub use surface::{Skin, SkinTriangle, Surface, SurfaceChange, Vertex};
 pub use sweep::Sweep;
+pub use touchable::{Corner, Touchable};
 
 /// A point, mm.
 pub type Point = [f64; 3];

@@ -59,6 +59,8 @@ pub struct Surface {
 struct Piece {
     /// Element and face of the mesh's border that it is a part of; none inside of the intact body.
     border: Option<(u32, u8)>,
+    /// A blade has gone through an element here.
+    is_cut: bool,
     corners: Vec<u32>,
 }
 
@@ -226,20 +228,23 @@ impl Surface {
         &mut self,
         cell: &Cell,
         points: &[Weights],
-        border: Option<(u32, u8)>,
+        (border, is_cut): (Option<(u32, u8)>, bool),
         pieces: &mut Vec<Piece>,
     ) -> Result<(), TopologyError> {
         let corner = |at: &Weights| (0..4).map(|k| (cell.nodes[k], at[k])).collect();
-        let mut corners = Vec::with_capacity(points.len());
-        for at in points {
-            corners.push(self.vertex(corner(at))?);
-        }
+        let found = points.iter().map(|at| self.vertex(corner(at)));
+        let mut corners = found.collect::<Result<Vec<u32>, TopologyError>>()?;
         corners.dedup();
         if corners.len() > 1 && corners.first() == corners.last() {
             corners.pop();
         }
         if corners.len() >= 3 {
-            push(pieces, Piece { border, corners })?;
+            let piece = Piece {
+                border,
+                is_cut,
+                corners,
+            };
+            push(pieces, piece)?;
         }
         Ok(())
     }
@@ -252,11 +257,12 @@ impl Surface {
             for cell in cells.iter().filter(|cell| cell.is_alive) {
                 for (side, points) in &cell.material().faces {
                     match side {
-                        Side::Cut { .. } => self.add(cell, points, None, &mut pieces)?,
+                        Side::Cut { .. } => self.add(cell, points, (None, true), &mut pieces)?,
                         Side::Face(face)
                             if mesh.neighbours(element)[usize::from(*face)] == OUTSIDE =>
                         {
-                            self.add(cell, points, Some((element, *face)), &mut pieces)?;
+                            let border = Some((element, *face));
+                            self.add(cell, points, (border, false), &mut pieces)?;
                         }
                         Side::Face(face) => {
                             let over = mesh.neighbours(element)[usize::from(*face)];
@@ -319,7 +325,7 @@ impl Surface {
                 weights
             };
             let points: Vec<Weights> = bare.iter().map(widen).collect();
-            self.add(cell, &points, None, pieces)?;
+            self.add(cell, &points, (None, false), pieces)?;
         }
         Ok(())
     }

@@ -1,83 +1,131 @@
-//! Where tools may touch: faces of elements, by the nodes of their cells.
-//!
-//! The lips of a cut run through elements, the faces do not: a face of which more than half is bare counts, and of the cells that share a face of the mesh's border the
-//! one with the largest part.
+//! Where tools may touch: faces of elements, and where a blade has gone through elements, or something has left, the surface there.
 
 use crate::TopologyError;
-use crate::body::{Body, Cell};
-use crate::connect::{common, on_face};
-use crate::polygon::double_area;
-use crate::rest::{FACES, OUTSIDE};
-use crate::room::{push, room};
+use crate::body::Body;
+use crate::polygon::normal;
+use crate::rest::{FACES, dot};
+use crate::room::{copied, push, room};
+use crate::surface::{NONE, SkinTriangle, Vertex};
 
-/// Of a whole face in barycentric coordinates, twice: a face of which less is bare does not count.
-const MOSTLY: f64 = 0.5;
+/// Nodes of one element and weights; places that are not needed repeat the first node with weight 0.
+pub type Corner = ([u32; 4], [f32; 4]);
+
+/// Triangles smaller than this have no normal and take no force, mm².
+const SMALLEST_MM2: f64 = 1e-4;
+
+/// See the module.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Touchable {
+    /// Of elements that nothing has touched, by their nodes, outward.
+    pub faces: Vec<[u32; 3]>,
+    pub corners: Vec<Corner>,
+    /// At the others: corners of triangles, outward. The largest come first, of what was the mesh's border, of faces that have been laid bare, and of walls.
+    pub pieces: Vec<[u32; 3]>,
+    /// Pieces from here on are walls: a blade has gone through elements there.
+    pub first_wall: usize,
+}
+
+impl Touchable {
+    /// Nodes of all of it, in no order and more than once.
+    pub fn nodes(&self) -> impl Iterator<Item = u32> {
+        let corners = self.corners.iter().flat_map(|corner| corner.0);
+        self.faces.as_flattened().iter().copied().chain(corners)
+    }
+}
 
 impl Body {
-    /// Faces `[.., 3]`, outward: those of the mesh's border for which `is_wanted` says so, by their mesh nodes in ascending order, where tissue is left behind
-    /// them, then those that have been laid bare.
+    /// Of the mesh's border the faces for which `is_wanted` says so, by their mesh nodes in ascending order, where tissue is left behind them, and what has been
+    /// laid bare.
+    ///
+    /// # Errors
+    /// No memory.
     pub fn touchable(
         &self,
         is_wanted: impl Fn([u32; 3]) -> bool,
-    ) -> Result<Vec<[u32; 3]>, TopologyError> {
+    ) -> Result<Touchable, TopologyError> {
         self.touchable_of(&self.mesh().border(is_wanted)?)
     }
 
     /// The same for faces of the mesh's border, an element and a face each ([`crate::RestMesh::border`]).
-    pub fn touchable_of(&self, border: &[(u32, u8)]) -> Result<Vec<[u32; 3]>, TopologyError> {
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn touchable_of(&self, border: &[(u32, u8)]) -> Result<Touchable, TopologyError> {
         let mesh = self.mesh();
-        let nodes = |cell: &Cell, face: usize| FACES[face].map(|corner| cell.nodes[corner]);
         let mut faces = room(border.len())?;
         for &(element, face) in border {
-            let (own, face) = (mesh.tet(element), usize::from(face));
-            let Some(cells) = self.cells.get(&element) else {
-                push(&mut faces, FACES[face].map(|corner| own[corner]))?;
-                continue;
-            };
-            let living = cells.iter().filter(|cell| cell.is_alive);
-            let part = |cell: &Cell| on_face(own, cell, face).map_or(0.0, |p| double_area(&p));
-            let largest = living.max_by(|a, b| part(a).total_cmp(&part(b)));
-            if let Some(cell) = largest.filter(|cell| part(cell) > 0.0) {
-                push(&mut faces, nodes(cell, face))?;
+            if !self.cells.contains_key(&element) {
+                let own = mesh.tet(element);
+                faces.push(FACES[usize::from(face)].map(|corner| own[corner]));
             }
         }
-        for &element in self.cells.keys() {
-            for (face, &over) in mesh.neighbours(element).iter().enumerate() {
-                if over == OUTSIDE {
-                    continue;
-                }
-                for cell in self.cells(element).iter().filter(|cell| cell.is_alive) {
-                    if self.is_bare((element, cell), face, over) {
-                        push(&mut faces, nodes(cell, face))?;
-                    }
-                }
-                let back = mesh.neighbours(over).iter().position(|own| *own == element);
-                if let (false, Some(back)) = (self.cells.contains_key(&over), back) {
-                    let whole = Cell::whole(mesh.tet(over));
-                    if self.is_bare((over, &whole), back, element) {
-                        push(&mut faces, nodes(&whole, back))?;
-                    }
-                }
+        let mut wanted = copied(border)?;
+        wanted.sort_unstable();
+        let skin = self.skin()?;
+        let corner_at = |corner: &u32| {
+            let vertex = &skin.vertices[*corner as usize];
+            self.rest_of(vertex)
+        };
+        let mut rated = room(skin.triangles.len())?;
+        for (at, triangle) in skin.triangles.iter().enumerate() {
+            let SkinTriangle {
+                corners,
+                border,
+                is_cut,
+            } = triangle;
+            let is_there = border.is_none_or(|own| wanted.binary_search(&own).is_ok());
+            let [a, b, c] = [0, 1, 2].map(|k| corner_at(&corners[k]));
+            let area = dot(normal(&[a, b, c]), normal(&[a, b, c])).sqrt();
+            if is_there && area >= SMALLEST_MM2 {
+                rated.push(((border.is_none(), *is_cut), area, at));
             }
         }
-        Ok(faces)
+        // Corners and edges belong to the first triangle that has them: its normal is the surest.
+        rated.sort_unstable_by(|a, b| {
+            let order = a.0.cmp(&b.0).then(b.1.total_cmp(&a.1));
+            order.then(a.2.cmp(&b.2))
+        });
+        let first_wall = rated.partition_point(|rated| !rated.0.1);
+        let mut places = room(skin.vertices.len())?;
+        places.resize(skin.vertices.len(), NONE);
+        let (mut corners, mut pieces) = (Vec::new(), room(rated.len())?);
+        for (_, _, at) in rated {
+            let mut piece = skin.triangles[at].corners;
+            for corner in &mut piece {
+                let place = &mut places[*corner as usize];
+                if *place == NONE {
+                    *place = corners.len() as u32;
+                    push(&mut corners, corner_of(&skin.vertices[*corner as usize]))?;
+                }
+                *corner = *place;
+            }
+            pieces.push(piece);
+        }
+        Ok(Touchable {
+            faces,
+            corners,
+            pieces,
+            first_wall,
+        })
     }
 
-    fn is_bare(&self, (element, cell): (u32, &Cell), face: usize, over: u32) -> bool {
-        let mesh = self.mesh();
-        let back = mesh.neighbours(over).iter().position(|own| *own == element);
-        let own = on_face(mesh.tet(element), cell, face);
-        let (Some(back), Some(own)) = (back, own) else {
-            return false;
-        };
-        let cells = self.cells(over);
-        let parted =
-            (cells.iter()).filter(|next| !self.is_joined((element, cell), face, over, next));
-        let bare = parted.filter_map(|next| on_face(mesh.tet(over), next, back));
-        let area = bare.map(|other| match common(&own, &other) {
-            points if points.is_empty() => 0.0,
-            points => double_area(&points),
-        });
-        area.sum::<f64>() > MOSTLY
+    /// Where a vertex is in the intact body.
+    fn rest_of(&self, vertex: &Vertex) -> crate::Point {
+        let mut at = [0.0; 3];
+        for (node, weight) in vertex.nodes.into_iter().zip(vertex.weights) {
+            if node != NONE {
+                let corner = self.mesh().position(self.parent(node));
+                at = [0, 1, 2].map(|k| at[k] + weight * corner[k]);
+            }
+        }
+        at
     }
+}
+
+fn corner_of(vertex: &Vertex) -> Corner {
+    let first = vertex.nodes[0];
+    let nodes = vertex
+        .nodes
+        .map(|node| if node == NONE { first } else { node });
+    (nodes, vertex.weights.map(|weight| weight as f32))
 }

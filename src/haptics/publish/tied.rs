@@ -76,7 +76,7 @@ impl OwnTies {
     /// The point of the tissue of a row.
     pub fn sample(&self, samples: &Samples, row: u32) -> Sample {
         self.of(row)
-            .map_or_else(|| samples.at(row), |placed| placed.tie.point)
+            .map_or_else(|| samples.at(row), |placed| placed.tie.point.into())
     }
 }
 
@@ -101,13 +101,13 @@ pub fn error(placed: &Placed, pose: &Pose, point: Vector, force: Vector) -> Vect
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ::contact::{Spring, Tie};
+    use ::contact::{Spring, Tie, TiePoint};
 
     /// What a damper held back is no motion; what the spring holds is none either.
     #[test]
     fn an_error_is_what_the_spring_alone_does_not_explain() {
         let tie = Tie {
-            point: Sample {
+            point: TiePoint {
                 nodes: [0; 3],
                 weights: [1.0, 0.0, 0.0],
             },

@@ -97,7 +97,7 @@ impl Between {
         let natural = corrections.space.natural_count();
         let problem = ContactProblem::new(model.samples()?, Arc::clone(&model.mesh), model.isa)?;
         Ok(Between {
-            touched: TouchedTissue::new(prior, problem.surface.samples.nodes(), count)?,
+            touched: TouchedTissue::new(prior, problem.surface.samples.all_nodes(), count)?,
             shown: None,
             problem,
             other: KnownStep {
@@ -235,7 +235,7 @@ impl Between {
         // What is shown, and where contact is looked at.
         let touched = match (known, question.drive) {
             (Some(_), Drive::Nodes(_)) => &[][..],
-            (_, Drive::Tools(_)) => self.problem.surface.samples.nodes(),
+            (_, Drive::Tools(_)) => self.problem.surface.samples.all_nodes(),
             (None, Drive::Nodes(now)) => &now.nodes,
         };
         for nodes in [touched, view.region] {
@@ -283,7 +283,7 @@ impl Between {
             // Where the tissue goes on as it went a quick or thin tool may have lost it, as often as it is pressed, or flung it: then it stays where the step left it.
             for pushed in [Moves::Pushed, Moves::Stays] {
                 if pushed == Moves::Stays {
-                    let nodes = self.problem.surface.samples.nodes();
+                    let nodes = self.problem.surface.samples.all_nodes();
                     self.led.stay(groups, nodes, last, &mut self.free);
                     q.fill(0.0);
                 }
@@ -313,7 +313,7 @@ impl Between {
                         return Ok(pushed);
                     }
                     let means = (self.isa, &self.pool, &**prior);
-                    let nodes = (self.problem.surface.samples.nodes(), &*self.held);
+                    let nodes = (self.problem.surface.samples.all_nodes(), &*self.held);
                     self.touched.place(means, nodes, &self.free, Some(q))?;
                     if !(self.touched).has_lost(&mut self.problem, rest, last) {
                         if !self.touched.has_flung(&self.problem) {
@@ -338,7 +338,7 @@ impl Between {
         };
         self.shown = Some(place);
         if solves.stays(place) {
-            let nodes = self.problem.surface.samples.nodes().iter();
+            let nodes = self.problem.surface.samples.all_nodes().iter();
             let nodes = nodes.chain(view.region);
             self.led.stay(groups, nodes, last, &mut self.free);
         }
@@ -389,7 +389,7 @@ impl Between {
             return Ok(false);
         }
         let q = self.shown.and_then(|place| solves.moves(place));
-        let nodes = (self.problem.surface.samples.nodes(), &*self.held);
+        let nodes = (self.problem.surface.samples.all_nodes(), &*self.held);
         let means = (self.isa, &self.pool, &**prior);
         self.touched.place(means, nodes, &self.free, q)?;
         self.touched.replace(region, u);

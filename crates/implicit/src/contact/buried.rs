@@ -107,12 +107,16 @@ fn deepest(
         let nodes = samples.nodes();
         let nearest = nearest_nodes(isa, (state.rest, state.u), nodes, &points);
         let squares = nearest.squares.iter().zip(nearest.places).take(count);
-        for (at, (square, place)) in squares.enumerate() {
+        for (at, (&square, place)) in squares.enumerate() {
             let depth = deepest.map_or(least, |buried| buried.depth);
             if square.sqrt() <= depth {
                 continue;
             }
             let point = Vector::from([0, 1, 2].map(|axis| points[axis][at]));
+            let (square, place) = nearest_inner(point, (square, place), samples, state);
+            if square.sqrt() <= depth {
+                continue;
+            }
             if let Some((found, in_doubt)) = below(point, place, samples, state)
                 && found.depth > depth
                 && (!in_doubt || is_inside(point))
@@ -123,7 +127,25 @@ fn deepest(
     }
 }
 
-/// The way out of a point that lies below the touchable surface where that is nearest, at the node in place `nearest` of the samples', and
+/// The nearest corner of the samples' faces, given the nearest of those that are nodes: squared distance and place.
+fn nearest_inner(
+    point: Vector,
+    nearest: (f32, u32),
+    samples: &Samples,
+    state: State<'_>,
+) -> (f32, u32) {
+    let inner = samples.inner_corners().iter();
+    let places = samples.nodes().len() as u32..;
+    inner.zip(places).fold(nearest, |least, (corner, place)| {
+        let at = corner.gather(|node| state.position(node));
+        match at.distance_squared(point) {
+            square if square < least.0 => (square, place),
+            _ => least,
+        }
+    })
+}
+
+/// The way out of a point that lies below the touchable surface where that is nearest, at the corner in place `nearest` of the samples', and
 /// whether it leads along a face to a rim of the surface.
 fn below(
     point: Vector,
@@ -141,7 +163,7 @@ fn below(
         let face = face as usize;
         let [a, b, c] = samples
             .corners(face)
-            .map(|at| state.position(samples.nodes()[at as usize]));
+            .map(|place| samples.corner_at(place, |node| state.position(node)));
         let weights = nearest_weights(point, [a, b, c]);
         let [u, v, w] = weights;
         let away = a * u + b * v + c * w - point;

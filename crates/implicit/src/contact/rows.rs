@@ -1,6 +1,6 @@
 //! The rows of a contact problem: samples near tools, and their gaps and slips at a state of the tissue.
 
-use ::contact::{Body, Contact, Law, Nearest, Pose, Samples, Vector, pose};
+use ::contact::{Body, Contact, LEAN, Law, Nearest, Pose, Samples, Vector, pose};
 
 use super::buried::Buried;
 use super::past::Held;
@@ -28,8 +28,6 @@ const LONG_WAY: f32 = 4.0;
 const GRAZED_MM: f32 = 0.1;
 /// A force this near (cosine) to the normal of a broad tool's nearest face comes from there, friction and all.
 const SAME_FACE: f32 = 0.7;
-/// A tool's normal may lean this much (cosine) to the outside of the tissue; beyond, the tool reaches the sample from within.
-pub(super) const LEAN: f32 = 0.2;
 
 /// A sample that is looked at.
 #[derive(Clone, Copy, Debug, HeldBytes)]
@@ -49,7 +47,7 @@ pub(super) struct Row {
 /// The tissue's outward normal at the face of a sample.
 pub fn outward(samples: &Samples, sample: u32, state: State<'_>) -> Vector {
     let corners = samples.corners(samples.face_of(sample));
-    let [a, b, c] = corners.map(|at| state.position(samples.nodes()[at as usize]));
+    let [a, b, c] = corners.map(|place| samples.corner_at(place, |node| state.position(node)));
     (b - a).cross(c - a).normalize_or_zero()
 }
 
@@ -68,6 +66,8 @@ pub struct Pair<'a> {
     pub swept: bool,
     /// The tool lies in the tissue: unit direction of the shortest way out.
     pub way_out: Option<Vector>,
+    /// The sample is on a wall that a blade has laid open.
+    pub is_wall: bool,
 }
 
 impl Pair<'_> {
@@ -98,6 +98,11 @@ impl Pair<'_> {
                 None if force == Vector::ZERO => return RELEASED,
                 None => {}
             }
+        } else if self.is_wall && gap < 0.0 {
+            let Some(nearest) = self.body.nearest_at_wall(self.now, point, outward) else {
+                return RELEASED;
+            };
+            (normal, gap) = (nearest.normal, nearest.distance);
         } else if let Some((face, depth)) = (self.pierced(point, start, outward, gap))
             .or_else(|| self.turned(point, outward, force, &nearest))
         {
@@ -302,6 +307,7 @@ impl Moving<'_> {
             way_out: self.buried[index]
                 .filter(|buried| row.sample == buried.row || buried.out.dot(row.outward) > 0.5)
                 .map(|buried| buried.out),
+            is_wall: self.samples.is_wall(self.samples.face_of(row.sample)),
         };
         let sample = self.samples.at(row.sample);
         let start = sample.gather(|node| self.state.position_before(node));
@@ -340,6 +346,7 @@ mod tests {
             put,
             swept: !put,
             way_out: None,
+            is_wall: false,
         };
         pair.contact(at, at, outward, force)
     }

@@ -54,7 +54,7 @@ pub mod grasp {
 
 /// Point, far end, spring and strength.
 pub mod tie {
-    use ::contact::{End, Sample, Spring, Tie, Vector};
+    use ::contact::{End, Spring, Tie, TiePoint, Vector};
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     type Point = ([u32; 3], [f32; 3]);
@@ -67,12 +67,12 @@ pub mod tie {
         Tissue(Point),
     }
 
-    fn taken(sample: &Sample) -> Point {
+    fn taken(sample: &TiePoint) -> Point {
         (sample.nodes, sample.weights)
     }
 
-    fn given((nodes, weights): Point) -> Sample {
-        Sample { nodes, weights }
+    fn given((nodes, weights): Point) -> TiePoint {
+        TiePoint { nodes, weights }
     }
 
     pub fn serialize<S: Serializer>(tie: &Tie, serializer: S) -> Result<S::Ok, S::Error> {

@@ -3,7 +3,7 @@
 //! Beside the rows of tools, which are samples of the surface, stand those of ties, with up to six nodes: a suture has nodes at both of its ends. Both are
 //! told by numbers: a tie's are the last ones there are.
 
-use ::contact::{Contact, End, Law, Pose, Sample, Samples, Tie, Vector};
+use ::contact::{Contact, End, Law, Pose, Sample, Samples, Tie, TiePoint, Vector};
 use serde::{Deserialize, Serialize};
 
 use super::stored;
@@ -94,6 +94,12 @@ impl RowNodes {
         self.entries().fold(Vector::ZERO, |sum, (node, weight)| {
             sum + field(node) * weight
         })
+    }
+}
+
+impl From<TiePoint> for RowNodes {
+    fn from(point: TiePoint) -> RowNodes {
+        Sample::from(point).into()
     }
 }
 

@@ -3,6 +3,7 @@
 //! Both get the same blades, aspirators and balls, step by step from their own last state. The solver runs here: a case is one or two seconds of tissue.
 
 mod programmes;
+mod site;
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -19,7 +20,8 @@ use crate::beside::{self, Relative, Steps, Subject, largest, percent, square};
 use crate::report::options::Options;
 use crate::table::Column;
 use gauge::{Sorted, median};
-use programmes::{BALL_MM, Frame, Operation, PROGRAMMES, Programme, Site};
+use programmes::{BALL_MM, Frame, Operation, PROGRAMMES, Programme};
+use site::Site;
 
 /// What the blades of the programmes feel, J/m².
 const FRACTURE_ENERGY: f64 = 10.0;

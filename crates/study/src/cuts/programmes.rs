@@ -3,12 +3,11 @@
 //! A case is a flat place of the domain, drawn from a seed. Places are millimetres from it: ahead along the surface, aside, and above the tissue.
 
 use contact::Vector;
-use upt::Scene;
+
+use super::site::Site;
 
 /// Of the ball that presses and holds, mm.
 pub const BALL_MM: f32 = 3.0;
-/// A place is flat where the surface this near to it looks the same way.
-const FLAT_MM: f32 = 12.0;
 
 /// What is done to the body.
 #[derive(Clone, Copy, Debug)]
@@ -43,15 +42,6 @@ pub struct Frame {
     pub grasp: bool,
 }
 
-/// A flat place of the domain.
-#[derive(Clone, Copy, Debug)]
-pub struct Site {
-    at: Vector,
-    normal: Vector,
-    along: Vector,
-    across: Vector,
-}
-
 /// A row of the table.
 pub struct Programme {
     pub name: &'static str,
@@ -62,7 +52,7 @@ pub struct Programme {
     pub feels: bool,
 }
 
-pub const PROGRAMMES: [Programme; 7] = [
+pub const PROGRAMMES: [Programme; 9] = [
     Programme {
         name: "incise",
         frames: incise,
@@ -100,79 +90,24 @@ pub const PROGRAMMES: [Programme; 7] = [
         feels: false,
     },
     Programme {
+        name: "wall",
+        frames: wall,
+        elsewhere: None,
+        feels: false,
+    },
+    Programme {
+        name: "part",
+        frames: part,
+        elsewhere: None,
+        feels: true,
+    },
+    Programme {
         name: "coagulate",
         frames: coagulate,
         elsewhere: None,
         feels: true,
     },
 ];
-
-impl Site {
-    /// The place of a seed, among the flattest tenth of the domain; none where the domain is small.
-    pub fn of(scene: &Scene, seed: u64) -> Option<Site> {
-        let mesh = scene.mesh();
-        let at = |node: u32| Vector::from_slice(&mesh.positions[3 * node as usize..][..3]);
-        let faces: Vec<(Vector, Vector)> = (mesh.domain_faces.chunks_exact(3))
-            .map(|face| {
-                let [a, b, c] = [0, 1, 2].map(|k| at(face[k]));
-                ((a + b + c) / 3.0, (b - a).cross(c - a))
-            })
-            .collect();
-        let mut rated: Vec<(f32, u32, Vector)> = (mesh.domain_nodes.iter())
-            .map(|&node| {
-                let near = faces
-                    .iter()
-                    .filter(|(middle, _)| (*middle - at(node)).length() < FLAT_MM);
-                let (sum, size) = near.fold((Vector::ZERO, 0.0), |(sum, size), (_, area)| {
-                    (sum + *area, size + area.length())
-                });
-                // A domain that ends here has less of it.
-                (sum.length() - 0.5 * size, node, sum)
-            })
-            .collect();
-        rated.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let best = rated.len().div_ceil(10);
-        let step = (0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(seed) >> 33) as usize;
-        let (_, node, sum) = *rated.get(step % best.max(1))?;
-        let normal = sum.normalize_or_zero();
-        let along = normal.any_orthonormal_vector();
-        Some(Site {
-            at: at(node),
-            normal,
-            along,
-            across: normal.cross(along),
-        })
-    }
-
-    /// Of the places of 40 seeds the farthest from this one.
-    pub fn another(&self, scene: &Scene) -> Option<Site> {
-        let sites = (1..=40).filter_map(|seed| Site::of(scene, seed));
-        let far = |site: &Site| (site.at - self.at).length();
-        sites.max_by(|a, b| far(a).total_cmp(&far(b)))
-    }
-
-    pub fn distance(&self, place: [f32; 3]) -> f32 {
-        (Vector::from(place) - self.at).length()
-    }
-
-    /// Where the ball waits.
-    pub fn away(&self) -> [f32; 3] {
-        self.place(0.0, 0.0, 35.0)
-    }
-
-    fn place(&self, ahead: f32, aside: f32, above: f32) -> [f32; 3] {
-        let at = self.at + self.along * ahead + self.across * aside + self.normal * above;
-        at.to_array()
-    }
-
-    /// An edge that stands upright, from below to 6 mm above the tissue.
-    fn upright(&self, ahead: f32, aside: f32, depth: f32) -> [[f32; 3]; 2] {
-        [
-            self.place(ahead, aside, -depth),
-            self.place(ahead, aside, 6.0),
-        ]
-    }
-}
 
 fn cut(stroke: u32, from: [[f32; 3]; 2], to: [[f32; 3]; 2]) -> Frame {
     Frame {
@@ -335,9 +270,8 @@ fn biopsy(site: &Site) -> Vec<Frame> {
     frames
 }
 
-/// A wedge of 40 x 24 mm, 12 mm deep, is cut out and leaves; a ball presses what stays 3 mm deep, beside the edge. (No samples are on a wall that a
-/// blade leaves: nothing touches it.)
-fn divide(site: &Site) -> Vec<Frame> {
+/// A wedge of 40 x 24 mm, 12 mm deep, is cut out and leaves.
+fn wedge(site: &Site) -> Vec<Frame> {
     // Two planes at 45 degrees that cross below, and two upright ones across their ends.
     let slant = |from: f32, to: f32, part: f32| {
         let aside = from + (to - from) * part;
@@ -360,6 +294,12 @@ fn divide(site: &Site) -> Vec<Frame> {
         operations: vec![Operation::Drop],
         ..Frame::default()
     });
+    frames
+}
+
+/// A ball presses what stays 3 mm deep, beside the edge of the wedge.
+fn divide(site: &Site) -> Vec<Frame> {
+    let mut frames = wedge(site);
     let (over, deep) = (
         site.place(0.0, -6.0, 5.0),
         site.place(0.0, -6.0, BALL_MM - 3.0),
@@ -367,6 +307,37 @@ fn divide(site: &Site) -> Vec<Frame> {
     come(&mut frames, site, over);
     go(&mut frames, false, 6, over, deep);
     go(&mut frames, false, 8, deep, deep);
+    frames
+}
+
+/// A ball presses the middle of the wall that the wedge leaves 3 mm deep, and goes 3 mm along it.
+fn wall(site: &Site) -> Vec<Frame> {
+    let mut frames = wedge(site);
+    // The wall goes down at 45 degrees from the place.
+    let off = |ahead: f32, above: f32| {
+        let part = (above + BALL_MM) * std::f32::consts::FRAC_1_SQRT_2;
+        site.place(ahead, 5.0 + part, part - 5.0)
+    };
+    let (over, deep, along) = (off(0.0, 1.5), off(0.0, -3.0), off(3.0, -3.0));
+    go(&mut frames, false, 6, site.place(0.0, 9.0, 20.0), over);
+    go(&mut frames, false, 6, over, deep);
+    go(&mut frames, false, 4, deep, along);
+    go(&mut frames, false, 6, along, along);
+    frames
+}
+
+/// A slit; then a ball goes into it from above, 5 mm deep, and pushes one of its walls 3 mm aside.
+fn part(site: &Site) -> Vec<Frame> {
+    let mut frames = slit(site, 0);
+    let (over, deep) = (
+        site.place(0.0, 0.0, 5.0),
+        site.place(0.0, 0.0, BALL_MM - 5.0),
+    );
+    let aside = site.place(0.0, 3.0, BALL_MM - 5.0);
+    come(&mut frames, site, over);
+    go(&mut frames, false, 8, over, deep);
+    go(&mut frames, false, 4, deep, aside);
+    go(&mut frames, false, 8, aside, aside);
     frames
 }
 

@@ -70,7 +70,7 @@ pub struct Options {
     /// replaces the part between the markers `study report --hang`.
     #[arg(long, value_name = "CASES", default_value_t = 0, hide_default_value = true, conflicts_with_all = ["trajectories", "data", "tools", "load"])]
     pub hang: usize,
-    /// Measure so many cases of each programme of cuts (incise, flap, resect, biopsy, divide, coagulate), in the bundles of --bundle against the reference solver,
+    /// Measure so many cases of each programme of cuts (incise, again, flap, resect, biopsy, divide, wall, part, coagulate), in the bundles of --bundle against the reference solver,
     /// which runs here. --markdown replaces the part between the markers `study report --cut`.
     #[arg(long, value_name = "CASES", default_value_t = 0, hide_default_value = true, conflicts_with_all = ["trajectories", "data", "tools", "load", "hang"])]
     pub cut: usize,

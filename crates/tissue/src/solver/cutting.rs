@@ -7,7 +7,7 @@ use super::fields::Node;
 use super::parts::Parts;
 use super::relaxing::Relaxing;
 use super::{Solver, SolverError};
-use contact::{SPACING_MM, Samples};
+use contact::{Pieces, SPACING_MM, Samples};
 use elements::{Laws, PADDING, Partition, Tetrahedra};
 use std::sync::Arc;
 use topology::{
@@ -142,7 +142,7 @@ impl Solver {
         };
         let change = operation(&mut body)?;
         let domain = &self.topology.domain;
-        let faces = body.touchable(|corners| domain.contains(&corners))?;
+        let touchable = body.touchable(|corners| domain.contains(&corners))?;
         let positions: Vec<[f32; 3]> = (0..body.node_count() as u32)
             .map(|node| self.positions[body.parent(node) as usize])
             .collect();
@@ -210,7 +210,14 @@ impl Solver {
         self.follow_loads()?;
         if let Some(touch) = &mut self.touch {
             let held = &self.topology.held_nodes;
-            let samples = Samples::new(&self.positions, faces, held, SPACING_MM);
+            let pieces = Pieces {
+                corners: &touchable.corners,
+                triangles: &touchable.pieces,
+                first_wall: touchable.first_wall,
+            };
+            let (positions, faces) = (&self.positions, &touchable.faces);
+            let samples = Samples::with_pieces(positions, faces, pieces, held, SPACING_MM);
+            let samples = samples.unwrap_or_else(|error| panic!("the samples: {error}"));
             touch.follow(&self.positions, &self.partition.slot_of_node, samples);
         }
         self.critical_now =

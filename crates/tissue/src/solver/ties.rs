@@ -6,7 +6,7 @@
 
 use super::fields::Node;
 use super::touch::{REPORT_S, SWEEPS};
-use contact::{End, Sample, Tie, Vector};
+use contact::{End, Tie, TiePoint, Vector};
 
 /// The tension that breaks a tie is a mean over this time, s: one inner step's is noisy.
 const BREAK_S: f64 = 0.001;
@@ -127,7 +127,7 @@ impl Ties {
                 _ => None,
             };
             let near = tie.point.entries();
-            let far = far.iter().flat_map(Sample::entries);
+            let far = far.iter().flat_map(TiePoint::entries);
             let nodes = near.chain(far.map(|(node, weight)| (node, -weight)));
             let nodes: Vec<(u32, f32)> = nodes.collect();
             let entries = nodes.iter().map(|&(own, weight)| Entry {

@@ -1,6 +1,6 @@
 //! The same bits for any number of threads; the same answer on any instruction set.
 
-use contact::{End, Sample, Spring, Tie, Vector};
+use contact::{End, Spring, Tie, TiePoint, Vector};
 use tissue::mesh::{Boundary, box_phantom};
 use tissue::solver::{
     ContactNode, FrameReport, Isa, Loads, Pressure, Solver, SolverOptions, SurfacePressure,
@@ -34,7 +34,7 @@ fn march(threads: usize, isa: Option<Isa>, pressure: Pressure) -> (Vec<[f32; 3]>
     solver.set_loads(&loads).unwrap();
     // A thread from the block's farthest corner.
     let corner = mesh.node_count() as u32 - 1;
-    let point = Sample {
+    let point = TiePoint {
         nodes: [corner; 3],
         weights: [1.0, 0.0, 0.0],
     };

@@ -1,6 +1,6 @@
 //! Ties against closed forms: springs in series with a bar, a weight on a thread, breaking, a suture, and a tie to a tool.
 
-use contact::{End, Pose, Sample, Shape, Spring, Tie, Vector};
+use contact::{End, Pose, Shape, Spring, Tie, TiePoint, Vector};
 use tissue::mesh::{Boundary, Mesh, box_phantom, regular_box};
 use tissue::solver::{FrameReport, Loads, Solver, SolverError, SolverOptions, Tool, ToolPose};
 
@@ -13,8 +13,8 @@ fn options(damping_per_s: f64) -> SolverOptions {
     options
 }
 
-fn at_node(node: u32) -> Sample {
-    Sample {
+fn at_node(node: u32) -> TiePoint {
+    TiePoint {
         nodes: [node; 3],
         weights: [1.0, 0.0, 0.0],
     }

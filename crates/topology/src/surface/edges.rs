@@ -60,6 +60,7 @@ impl Surface {
                     if is_on && split.insert((element, face as u8)) {
                         let piece = Piece {
                             border: Some((element, face as u8)),
+                            is_cut: false,
                             corners: corners.to_vec(),
                         };
                         push(pieces, piece)?;

@@ -12,6 +12,8 @@ pub struct SkinTriangle {
     pub corners: [u32; 3],
     /// Element and face of the mesh's border that it is a part of; none on the walls of cuts and cavities.
     pub border: Option<(u32, u8)>,
+    /// A blade has gone through an element here.
+    pub is_cut: bool,
 }
 
 /// The surface at elements that something has touched; all else is the mesh's border.
@@ -43,8 +45,12 @@ impl Body {
             let mut found = Vec::with_capacity(piece.corners.len());
             surface.fill(&piece, &mut |corners, _| found.push(corners))?;
             for corners in found {
-                let border = piece.border;
-                push(&mut triangles, SkinTriangle { corners, border })?;
+                let triangle = SkinTriangle {
+                    corners,
+                    border: piece.border,
+                    is_cut: piece.is_cut,
+                };
+                push(&mut triangles, triangle)?;
             }
         }
         Ok(Skin {

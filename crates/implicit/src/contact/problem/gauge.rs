@@ -1,11 +1,11 @@
 //! What rows are measured by: the tools on their ways, the ties, and what both hold.
 
-use ::contact::{Samples, Vector};
+use ::contact::{LEAN, Samples, Vector};
 
 use super::tie_set::TieSet;
 use super::ways::ToolWays;
 use crate::contact::past::{Force, Past};
-use crate::contact::rows::{LEAN, Moving, OPEN_MM, Row, outward};
+use crate::contact::rows::{Moving, OPEN_MM, Row, outward};
 use crate::contact::state::State;
 use crate::contact::ties::Points;
 

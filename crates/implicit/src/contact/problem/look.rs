@@ -121,6 +121,7 @@ impl NearRows {
                 put: ways.put[index],
                 swept: ways.swept[index],
                 way_out: ways.buried[index].map(|buried| buried.out),
+                is_wall: false,
             };
             let found = found.iter().filter(|found| {
                 let start = || {

@@ -85,7 +85,7 @@ impl ContactProblem {
         solution.fit(rows, rows + near.shed.len() + tied.list.len())?;
         memory::fit(&mut next.forces, forces.max(kept.most()), WHAT)?;
         prescribed.fit(forces)?;
-        work.take(LOOK_WORK * (surface.samples.nodes().len() + near.found) as u64);
+        work.take(LOOK_WORK * (surface.samples.all_nodes().len() + near.found) as u64);
         let gauge = Gauge {
             samples: &surface.samples,
             ways,

@@ -10,8 +10,10 @@ pub(super) struct Row {
     /// Place on the tool of a sample that it holds.
     pub bound: Option<Vector>,
     /// Places in the list of reached nodes.
-    pub nodes: [u32; 3],
-    pub weights: [f32; 3],
+    pub nodes: [u32; 4],
+    pub weights: [f32; 4],
+    /// Outward normal of a wall that a blade has laid open, when the last search was made.
+    pub wall: Option<Vector>,
     /// On the tissue, µN, of the last inner step.
     pub force: Vector,
     /// At the end of the last inner step, mm; none for a row that is new.

@@ -3,7 +3,7 @@
 use super::Touch;
 use super::row::{Reached, Row};
 use contact::grasp::REACH_MM;
-use contact::{Placed, SKIN_MM, Vector, pose};
+use contact::{Placed, SKIN_MM, Samples, Vector, pose};
 
 /// Inner steps between two searches.
 pub(super) const SEARCH_STEPS: u32 = 10;
@@ -52,6 +52,9 @@ impl Touch {
             }
         }
         self.keep_pushed();
+        for row in &mut self.rows {
+            row.wall = wall(&scene.samples, row.sample, &position);
+        }
         self.keep_forces();
         self.reached.clear();
         for row in &self.rows {
@@ -111,13 +114,26 @@ impl Touch {
     }
 }
 
+/// The outward normal of a sample that is on a wall.
+fn wall(samples: &Samples, sample: u32, position: impl Fn(u32) -> Vector) -> Option<Vector> {
+    let face = samples.face_of(sample);
+    if !samples.is_wall(face) {
+        return None;
+    }
+    let [a, b, c] = samples
+        .corners(face)
+        .map(|place| samples.corner_at(place, &position));
+    Some((b - a).cross(c - a).normalize_or_zero())
+}
+
 fn row(scene: &super::Scene, tool: u32, sample: u32, bound: Option<Vector>) -> Row {
     Row {
         tool,
         sample,
         bound,
-        nodes: [0; 3],
+        nodes: [0; 4],
         weights: scene.samples.at(sample).weights,
+        wall: None,
         force: Vector::ZERO,
         last_gap: None,
         last_slip: None,

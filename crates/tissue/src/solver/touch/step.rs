@@ -137,6 +137,11 @@ impl Touch {
             let nearest = body.nearest_at(now, row.point);
             row.normal = nearest.normal;
             row.gap = nearest.distance;
+            if let (Some(outward), None) = (row.wall, row.bound) {
+                let found = body.nearest_at_wall(now, row.point, outward);
+                (row.normal, row.gap) =
+                    found.map_or((-outward, f32::MAX), |found| (found.normal, found.distance));
+            }
             match row.bound {
                 Some(place) => row.slip = row.point - now.transform_point(place),
                 None => {
@@ -267,8 +272,13 @@ impl Touch {
 
     /// A row's value of something that its nodes have.
     fn value(&self, row: &Row, of: impl Fn(&super::Reached) -> Vector) -> Vector {
-        let [a, b, c] = row.nodes.map(|node| of(&self.reached[node as usize]));
-        a * row.weights[0] + b * row.weights[1] + c * row.weights[2]
+        let [u, v, w, x] = row.weights;
+        let [a, b, c, d] = row.nodes.map(|node| of(&self.reached[node as usize]));
+        let on_face = a * u + b * v + c * w;
+        match x == 0.0 {
+            true => on_face,
+            false => on_face + d * x,
+        }
     }
 }
 
