@@ -24,8 +24,8 @@ use super::HapticOptions;
 use super::ends::Ends;
 use super::modes::Modes;
 use super::render::Haptics;
-use super::snapshot::{ContactSnapshot, MOST_SAMPLES};
-use crate::contact::{Compliance, Delassus, Mode, PUT_MM, Pair, State, outward, vector};
+use super::snapshot::{ContactSnapshot, Facing, MOST_SAMPLES};
+use crate::contact::{Compliance, Delassus, Mode, PUT_MM, Pair, State, vector};
 use crate::corrections::{Corrections, Integrator};
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
@@ -236,12 +236,17 @@ impl Link {
             let groups = step.corrections.groups.as_slice();
             let base = |node| Vector::from(self.carried.velocity(groups, node));
             snapshot.carried[at] = sample.gather(base);
-            snapshot.outward[at] = match tie {
-                Some(_) => Vector::X,
-                None => outward(&self.near.samples, row, state),
-            };
             let samples = &self.near.samples;
-            snapshot.walls[at] = tie.is_none() && samples.is_wall(samples.face_of(row));
+            snapshot.facing[at] = match tie {
+                Some(_) => Facing {
+                    outward: Vector::X,
+                    is_wall: false,
+                },
+                None => Facing {
+                    outward: samples.outward(row, |node| state.position(node)),
+                    is_wall: samples.is_on_wall(row),
+                },
+            };
             snapshot.ties[at] = tie;
             snapshot.forces[at] = force;
             snapshot.anchors[at] = anchor;
@@ -259,10 +264,10 @@ impl Link {
                     put: false,
                     swept: true,
                     way_out: None,
-                    is_wall: snapshot.walls[at],
+                    is_wall: snapshot.facing[at].is_wall,
                 };
                 let pushed = force != Vector::ZERO;
-                let contact = pair.contact(point, point, snapshot.outward[at], force);
+                let contact = pair.contact(point, point, snapshot.facing[at].outward, force);
                 match (anchor, pushed) {
                     (Some(_), _) => contact.slip,
                     _ if contact.gap == f32::MAX => Vector::ZERO,

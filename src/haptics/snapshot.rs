@@ -27,10 +27,8 @@ pub struct ContactSnapshot {
     /// How fast support groups carry them, mm/s, and how long that is followed after the step, s.
     pub carried: Vec<Vector>,
     pub followed_s: f64,
-    /// The surface's normal there.
-    pub outward: Vec<Vector>,
-    /// Whether they are on walls that a blade has laid open.
-    pub walls: Vec<bool>,
+    /// The surface there.
+    pub facing: Vec<Facing>,
     /// Of the tool on the tissue, mN.
     pub forces: Vec<Vector>,
     /// Of a held one, its place on the tool.
@@ -53,6 +51,15 @@ pub struct ContactSnapshot {
     pub drive: Vec<f32>,
 }
 
+/// How the surface lies at a sample.
+#[derive(Clone, Copy, Debug, Default, HeldBytes)]
+pub struct Facing {
+    /// Outward, unit length.
+    pub outward: Vector,
+    /// It is a wall that a blade has laid open.
+    pub is_wall: bool,
+}
+
 impl ContactSnapshot {
     /// Room for a body of `modes` natural modes.
     ///
@@ -69,8 +76,7 @@ impl ContactSnapshot {
             points: vectors()?,
             carried: vectors()?,
             followed_s: 0.0,
-            outward: vectors()?,
-            walls: memory::filled(MOST_SAMPLES, false, WHAT)?,
+            facing: memory::filled(MOST_SAMPLES, Facing::default(), WHAT)?,
             forces: vectors()?,
             anchors: memory::filled(MOST_SAMPLES, None, WHAT)?,
             ties: memory::filled(MOST_SAMPLES, None, WHAT)?,

@@ -209,7 +209,7 @@ impl Solver {
                 put: false,
                 swept: true,
                 way_out: None,
-                is_wall: snapshot.walls[at],
+                is_wall: snapshot.facing[at].is_wall,
             };
             let (point, start) = (
                 self.touched_at(snapshot, body, at, now),
@@ -217,7 +217,7 @@ impl Solver {
             );
             let mut contact = match &snapshot.ties[at] {
                 Some(tie) => pulling(tie, now, point),
-                None => pair.contact(point, start, snapshot.outward[at], force),
+                None => pair.contact(point, start, snapshot.facing[at].outward, force),
             };
             match contact.law {
                 Law::Bound | Law::Tie(_) => contact.slip -= error,

@@ -6,6 +6,7 @@ mod info;
 mod portable;
 mod precision;
 mod reduced;
+mod samples;
 mod supports;
 mod upt;
 mod upt_stages;
@@ -257,20 +258,7 @@ impl Model {
         if let Some(made) = self.samples.get() {
             return Ok(Arc::clone(made));
         }
-        let mesh = &self.mesh;
-        let opened = &mesh.opened;
-        let made = ::contact::Samples::with_pieces(
-            mesh.positions.as_chunks().0,
-            mesh.domain_faces.as_chunks().0,
-            ::contact::Pieces {
-                corners: &opened.corners,
-                triangles: &opened.pieces,
-                first_wall: opened.first_wall,
-            },
-            &mesh.held_nodes,
-            ::contact::SPACING_MM,
-        );
-        let made = Arc::new(crate::memory::tried(made, "the samples of the surface")?);
+        let made = Arc::new(samples::of(&self.mesh)?);
         Ok(Arc::clone(self.samples.get_or_init(|| made)))
     }
 

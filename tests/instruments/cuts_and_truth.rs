@@ -149,9 +149,12 @@ fn a_tool_in_a_slit_parts_its_walls() {
     let mut frames: Vec<Frame> = down.chain(aside).collect();
     frames[0].0 = Some(Operation::Cut(slit(&scene, 0.0, 15.0)));
     let found = compare(&model, "onnx/liver-coarse/mesh.safetensors", &frames);
-    println!("{found:?}");
-    let (mean, force) = errors(&found);
-    assert!(mean < 0.02 && force < 0.1, "{mean} mm², {force}");
+    // It goes in by a millimetre in 50 ms, and lips slip off it a step sooner or later; then both are at rest at the same place.
+    let (mean, _) = errors(&found);
+    let (left, force) = errors(&found[19..]);
+    let pushed = found[found.len() - 1].2;
+    assert!(pushed > 100.0 && mean < 0.1, "{mean} mm², {pushed} mN");
+    assert!(left < 0.001 && force < 0.02, "{left} mm², {force}");
 }
 
 #[test]

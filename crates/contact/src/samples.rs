@@ -293,9 +293,21 @@ impl Samples {
         }
     }
 
+    /// The tissue's outward normal at a row; `position` gives a node's.
+    pub fn outward(&self, row: u32, position: impl Fn(u32) -> Vector) -> Vector {
+        let corners = self.corners[self.face_of(row)];
+        let [a, b, c] = corners.map(|place| self.corner_at(place, &position));
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
     /// Whether a face is a wall that a blade has laid open.
     pub fn is_wall(&self, face: usize) -> bool {
         face >= self.inner.first_wall
+    }
+
+    /// Whether a row is on one.
+    pub fn is_on_wall(&self, row: u32) -> bool {
+        self.inner.first_wall < self.face_count() && self.is_wall(self.face_of(row))
     }
 
     /// Number of sampled faces.

@@ -201,7 +201,8 @@ fn walls_have_samples_inside_of_elements() {
         (&[4, 5, 6, 7][..], 8)
     );
     assert_eq!(samples.inner_corners().len(), 4);
-    let walls: Vec<bool> = (0..4).map(|face| samples.is_wall(face)).collect();
+    let last = |face: usize| samples.of_face(face).end as u32 - 1;
+    let walls = [0, 1, 2, 3].map(|face| samples.is_on_wall(last(face)));
     assert_eq!(walls, [false, false, true, true]);
     // The nodes below go up by 1: the wall by half of it, the border not at all.
     let moved = |node: u32| point(&positions, node) + Vector::Z * f32::from(u8::from(node < 4));

@@ -10,8 +10,9 @@ use crate::surface::{NONE, SkinTriangle, Vertex};
 /// Nodes of one element and weights; places that are not needed repeat the first node with weight 0.
 pub type Corner = ([u32; 4], [f32; 4]);
 
-/// Triangles smaller than this have no normal and take no force, mm².
-const SMALLEST_MM2: f64 = 1e-4;
+/// Triangles smaller than this take no force, mm²: half a square of the distance between samples. What holds one of them by its corners would throw the nodes
+/// of its element, which lie far outside of it.
+const SMALLEST_MM2: f64 = 1.0;
 
 /// See the module.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -189,7 +189,10 @@ fn below(
         point,
     };
     let is_along = along_normal < IN_DOUBT * buried.depth * face_outward.length();
-    let in_doubt = is_along && is_on_rim(samples, face, weights);
+    // At a wall it may lie in the slit before it.
+    let mut around = samples.faces_at(nearest).iter();
+    let is_at_wall = around.any(|face| samples.is_wall(*face as usize));
+    let in_doubt = is_at_wall || (is_along && is_on_rim(samples, face, weights));
     Some((buried, in_doubt))
 }
 

@@ -39,7 +39,7 @@ pub use delassus::Delassus;
 pub use past::{Force, Past};
 pub use problem::ContactProblem;
 pub(crate) use problem::bound_work;
-pub use rows::{Pair, outward};
+pub use rows::Pair;
 pub use state::State;
 pub use state::vector;
 pub use ties::{HeldTie, MAX_TIES, Placed, Points};

@@ -42,13 +42,8 @@ pub(super) struct Row {
     pub(super) gap: f32,
     /// Of the tissue's surface, outward.
     pub(super) outward: Vector,
-}
-
-/// The tissue's outward normal at the face of a sample.
-pub fn outward(samples: &Samples, sample: u32, state: State<'_>) -> Vector {
-    let corners = samples.corners(samples.face_of(sample));
-    let [a, b, c] = corners.map(|place| samples.corner_at(place, |node| state.position(node)));
-    (b - a).cross(c - a).normalize_or_zero()
+    /// It is on a wall that a blade has laid open.
+    pub(super) is_wall: bool,
 }
 
 /// A tool on its way from one pose to another, and a sample that it may touch.
@@ -307,7 +302,7 @@ impl Moving<'_> {
             way_out: self.buried[index]
                 .filter(|buried| row.sample == buried.row || buried.out.dot(row.outward) > 0.5)
                 .map(|buried| buried.out),
-            is_wall: self.samples.is_wall(self.samples.face_of(row.sample)),
+            is_wall: row.is_wall,
         };
         let sample = self.samples.at(row.sample);
         let start = sample.gather(|node| self.state.position_before(node));

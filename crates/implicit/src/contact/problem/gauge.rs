@@ -5,7 +5,7 @@ use ::contact::{LEAN, Samples, Vector};
 use super::tie_set::TieSet;
 use super::ways::ToolWays;
 use crate::contact::past::{Force, Past};
-use crate::contact::rows::{Moving, OPEN_MM, Row, outward};
+use crate::contact::rows::{Moving, OPEN_MM, Row};
 use crate::contact::state::State;
 use crate::contact::ties::Points;
 
@@ -52,7 +52,8 @@ impl<'a> Gauge<'a> {
             far: false,
             gap: 0.0,
             point: nodes.gather(|node| state.position(node)),
-            outward: outward(self.samples, sample, state),
+            outward: (self.samples).outward(sample, |node| state.position(node)),
+            is_wall: self.samples.is_on_wall(sample),
         }
     }
 

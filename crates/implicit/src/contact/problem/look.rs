@@ -8,7 +8,7 @@ use super::tie_set::TieSet;
 use super::ways::ToolWays;
 use crate::contact::past::Past;
 use crate::contact::rows::WHAT;
-use crate::contact::rows::{Pair, Row, outward};
+use crate::contact::rows::{Pair, Row};
 use crate::contact::state::State;
 use crate::contact::ties::NO_TOOL;
 use crate::contact::tool::MAX_TOOLS;
@@ -100,6 +100,7 @@ impl NearRows {
             gap: 0.0,
             point: Vector::ZERO,
             outward: Vector::ZERO,
+            is_wall: false,
         };
         let Surface {
             samples, search, ..
@@ -150,7 +151,8 @@ impl NearRows {
         for row in &mut self.rows {
             let sample = samples.at(row.sample);
             row.point = sample.gather(|node| state.position(node));
-            row.outward = outward(samples, row.sample, state);
+            row.outward = samples.outward(row.sample, |node| state.position(node));
+            row.is_wall = samples.is_on_wall(row.sample);
         }
         // A sample beyond the skin is a row only where the tool has come as near on its way.
         let gauge = Gauge {

@@ -207,6 +207,7 @@ impl TieSet {
                 far: false,
                 gap: 0.0,
                 outward: Vector::ZERO,
+                is_wall: false,
             });
         }
         Ok(())

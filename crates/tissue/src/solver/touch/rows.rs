@@ -3,7 +3,7 @@
 use super::Touch;
 use super::row::{Reached, Row};
 use contact::grasp::REACH_MM;
-use contact::{Placed, SKIN_MM, Samples, Vector, pose};
+use contact::{Placed, SKIN_MM, Vector, pose};
 
 /// Inner steps between two searches.
 pub(super) const SEARCH_STEPS: u32 = 10;
@@ -53,7 +53,8 @@ impl Touch {
         }
         self.keep_pushed();
         for row in &mut self.rows {
-            row.wall = wall(&scene.samples, row.sample, &position);
+            let is_wall = scene.samples.is_on_wall(row.sample);
+            row.wall = is_wall.then(|| scene.samples.outward(row.sample, &position));
         }
         self.keep_forces();
         self.reached.clear();
@@ -112,18 +113,6 @@ impl Touch {
     pub(super) fn part(&self, step: u32) -> f32 {
         step as f32 / self.steps as f32
     }
-}
-
-/// The outward normal of a sample that is on a wall.
-fn wall(samples: &Samples, sample: u32, position: impl Fn(u32) -> Vector) -> Option<Vector> {
-    let face = samples.face_of(sample);
-    if !samples.is_wall(face) {
-        return None;
-    }
-    let [a, b, c] = samples
-        .corners(face)
-        .map(|place| samples.corner_at(place, &position));
-    Some((b - a).cross(c - a).normalize_or_zero())
 }
 
 fn row(scene: &super::Scene, tool: u32, sample: u32, bound: Option<Vector>) -> Row {
