@@ -177,14 +177,14 @@ fn a_grasp_holds_what_is_in_reach_until_it_is_pulled_too_hard() {
     assert!(grasp.anchors().is_empty());
 }
 
-/// Two elements' walls over a square of 6 mm at height 2.5: each corner halfway between a node below and one above.
+/// Walls in two elements over a square of 6 mm with a common node above it: each corner halfway up.
 #[test]
 fn walls_have_samples_inside_of_elements() {
     let square = [[0.0, 0.0], [6.0, 0.0], [6.0, 6.0], [0.0, 6.0]];
     let at = |height: f32| square.map(|[x, y]| [x, y, height]);
-    let positions = [at(0.0), at(5.0)].concat();
+    let positions = [&at(0.0)[..], &at(5.0), &[[3.0, 3.0, 5.0]]].concat();
     let corners: Vec<([u32; 4], [f32; 4])> = (0..4)
-        .map(|at| ([at, at + 4, at, at], [0.5, 0.5, 0.0, 0.0]))
+        .map(|at| ([at, 8, at, at], [0.5, 0.5, 0.0, 0.0]))
         .collect();
     // The first piece is a part of the border, by three nodes.
     let single = [4, 5, 6].map(|node| ([node; 4], [1.0, 0.0, 0.0, 0.0]));
@@ -198,7 +198,7 @@ fn walls_have_samples_inside_of_elements() {
     let samples = made.unwrap();
     assert_eq!(
         (samples.nodes(), samples.all_nodes().len()),
-        (&[4, 5, 6, 7][..], 8)
+        (&[4, 5, 6, 7][..], 9)
     );
     assert_eq!(samples.inner_corners().len(), 4);
     let last = |face: usize| samples.of_face(face).end as u32 - 1;
@@ -231,8 +231,8 @@ fn walls_have_samples_inside_of_elements() {
     };
     let mut search = Search::with_room(&samples).unwrap();
     let found = search.find(&samples, &[placed], |node| point(&positions, node));
-    assert!(found.len() > 3 && found.iter().all(|near| (near.point.z - 2.5).abs() < 1e-5));
-    let held: Vec<u32> = (0..8).collect();
+    assert!(found.len() > 1 && found.iter().all(|near| (near.point.z - 2.5).abs() < 1e-5));
+    let held: Vec<u32> = (0..9).collect();
     let none = Samples::with_pieces(&positions, &[[4, 6, 7]], pieces, &held, 1.7).unwrap();
     assert!(none.is_empty());
 }

@@ -93,7 +93,7 @@ impl Pair<'_> {
                 None if force == Vector::ZERO => return RELEASED,
                 None => {}
             }
-        } else if self.is_wall && gap < 0.0 {
+        } else if self.is_wall {
             let Some(nearest) = self.body.nearest_at_wall(self.now, point, outward) else {
                 return RELEASED;
             };
