@@ -36,7 +36,7 @@ impl Sample {
         entries.filter(|(_, weight)| *weight != 0.0)
     }
 
-    /// The mean of points of one element.
+    /// The mean of points of one element: four nodes in all.
     fn mean(parts: [Sample; 3], weights: [f32; 3]) -> Sample {
         let mut mean = Sample {
             nodes: [parts[0].nodes[0]; 4],
@@ -46,6 +46,7 @@ impl Sample {
         for (part, weight) in parts.iter().zip(weights) {
             for (node, own) in part.entries().filter(|_| weight != 0.0) {
                 let known = mean.nodes[..count].iter().position(|known| *known == node);
+                debug_assert!(known.is_some() || count < 4, "points of one element");
                 let at = known.unwrap_or(count.min(3));
                 mean.nodes[at] = node;
                 mean.weights[at] += weight * own;

@@ -55,6 +55,8 @@ fn bodies_are_cut_as_the_solvers_are() {
         "resect",
         "biopsy",
         "divide",
+        "wall",
+        "part",
         "coagulate",
     ];
     assert_eq!(names, all);

@@ -16,7 +16,7 @@ pub struct Prescribed {
 impl Prescribed {
     /// Room for the nodes of two solves' samples.
     pub fn new() -> Result<Prescribed> {
-        let nodes = 6 * MOST_ROWS;
+        let nodes = 8 * MOST_ROWS;
         Ok(Prescribed {
             nodes: memory::room(nodes, WHAT)?,
             vectors: memory::room(3 * nodes, WHAT)?,
@@ -25,8 +25,8 @@ impl Prescribed {
 
     /// Room for the nodes of so many forces.
     pub fn fit(&mut self, forces: usize) -> Result<()> {
-        memory::fit(&mut self.nodes, 3 * forces, WHAT)?;
-        memory::fit(&mut self.vectors, 9 * forces, WHAT)
+        memory::fit(&mut self.nodes, 4 * forces, WHAT)?;
+        memory::fit(&mut self.vectors, 12 * forces, WHAT)
     }
 
     /// Each node once, ascending.

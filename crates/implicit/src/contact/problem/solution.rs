@@ -173,9 +173,9 @@ impl Solution {
         memory::fit(&mut self.forces, rows, WHAT)?;
         memory::fit(&mut self.earlier, rows, WHAT)?;
         memory::fit(&mut self.contacts, rows, WHAT)?;
-        // Three nodes a sample, six a tie, and three axes a node; `blend` gives forces of before their part back.
-        memory::fit(&mut self.columns, 9 * changed, WHAT)?;
-        memory::fit(&mut self.change, 9 * changed, WHAT)
+        // Four nodes a sample, eight a tie at most, and three axes a node; `blend` gives forces of before their part back.
+        memory::fit(&mut self.columns, 12 * changed, WHAT)?;
+        memory::fit(&mut self.change, 12 * changed, WHAT)
     }
 
     /// Solves for the forces on `near`, whose points go along; `is_short` of work makes no linearisation again.
