@@ -4,6 +4,7 @@
 //! iterations do not bring it back. Where tools have come nearer the last state is in balance too, but not in contact.
 
 use super::{Iterate, LEAST_WAY_MM, ToolStep};
+use crate::contact::ContactProblem;
 use crate::corrections::precondition::mask_held;
 use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
@@ -37,18 +38,21 @@ impl ToolStep<'_> {
 
 /// `|F(u) - B^T f|` and `|B^T f|` on the free nodes, µN.
 fn left_out(step: &mut ToolStep<'_>, at: &Iterate<'_>) -> (f64, f64) {
-    let held = &step.context.held.is;
     let left = &mut step.solver.fields.q;
-    left.copy_from_slice(at.g);
+    take_loads(step.problem, &step.context.held.is, at.g, left);
     let mut loads = 0.0;
-    step.problem.each_load(|node, force| {
-        let force = force * 1e3;
-        loads += f64::from(force.length_squared());
-        let at = 3 * node as usize;
-        let sum = left[at..at + 3].iter_mut().zip(force.to_array());
-        sum.for_each(|(left, force)| *left -= force);
-    });
-    mask_held(held, left);
+    (step.problem).each_load(|_, force| loads += f64::from((force * 1e3).length_squared()));
     let sum: f64 = left.iter().map(|x| f64::from(*x) * f64::from(*x)).sum();
     (libm::sqrt(sum), libm::sqrt(loads))
+}
+
+/// `to` becomes `F(u) - B^T f` on the free nodes, µN: what the tools push with is balanced near them.
+pub(super) fn take_loads(problem: &ContactProblem, held: &[bool], g: &[f32], to: &mut [f32]) {
+    to.copy_from_slice(g);
+    problem.each_load(|node, force| {
+        let rows = to[3 * node as usize..].iter_mut();
+        let loads = rows.zip(force.to_array());
+        loads.for_each(|(g, force)| *g -= 1e3 * force);
+    });
+    mask_held(held, to);
 }

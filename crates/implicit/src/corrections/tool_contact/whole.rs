@@ -1,8 +1,8 @@
 //! Modes of the whole body, and of what a support group held, in a step that tools drive.
 
+use super::thrown::take_loads;
 use super::{Iterate, ToolStep};
 use crate::corrections::fields::Fields;
-use crate::corrections::precondition::mask_held;
 use crate::corrections::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 
@@ -45,16 +45,7 @@ impl ToolStep<'_> {
             ..
         } = self;
         let env = context.env();
-        let unbalanced = |g: &[f32], to: &mut Vec<f32>| {
-            to.copy_from_slice(g);
-            // What the tools push with is balanced near them.
-            problem.each_load(|node, force| {
-                let rows = to[3 * node as usize..].iter_mut();
-                rows.zip(force.to_array())
-                    .for_each(|(g, force)| *g -= 1e3 * force);
-            });
-            mask_held(&env.held.is, to);
-        };
+        let unbalanced = |g: &[f32], to: &mut Vec<f32>| take_loads(problem, &env.held.is, g, to);
         let ImplicitSolver {
             preconditioner,
             balance,
