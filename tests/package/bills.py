@@ -60,6 +60,12 @@ KINDS = [
     ),
     Kind("libupt-{v}-py3-none-manylinux_2_35_aarch64.whl", ("upt/lib/libupt.so", ORGAN), (LEARNED,), (X86, COMMAND)),
     Kind("libupt-{v}-py3-none-win_amd64.whl", ("upt/lib/upt.dll", ORGAN), (WINDOWS, LEARNED), (COMMAND,)),
+    Kind(
+        "libupt-{v}-py3-none-macosx_10_12_x86_64.whl",
+        ("upt/lib/libupt.dylib", ORGAN),
+        (LEARNED, X86),
+        (WINDOWS, COMMAND),
+    ),
     Kind("libupt-{v}-py3-none-macosx_11_0_arm64.whl", ("upt/lib/libupt.dylib", ORGAN), (LEARNED,), (X86, WINDOWS)),
     Kind(
         "libupt-godot-{v}-linux-x64.zip",

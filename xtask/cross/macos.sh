@@ -41,10 +41,8 @@ PYTHON
   stub libc++.1.dylib "${wait}20__libcpp_atomic_waitEPVKvx" "${wait}23__libcpp_atomic_monitorEPVKv" \
     "${wait}23__cxx_atomic_notify_oneEPVKv" "${wait}23__cxx_atomic_notify_allEPVKv" >"$sdk/usr/lib/libc++.tbd"
 fi
-host="$(rustc -vV | sed -n 's/^host: //p')"
-UPT_MACOS_LLD="$(rustc --print sysroot)/lib/rustlib/$host/bin/rust-lld"
-export UPT_MACOS_LLD SDKROOT="$sdk"
+export SDKROOT="$sdk"
 for arch in AARCH64 X86_64; do
-  export "CARGO_TARGET_${arch}_APPLE_DARWIN_LINKER=$root/xtask/cross/macos_ld.sh"
+  export "CARGO_TARGET_${arch}_APPLE_DARWIN_LINKER=$root/xtask/cross/lld.sh"
   export "CARGO_TARGET_${arch}_APPLE_DARWIN_RUSTFLAGS=-Clinker-flavor=ld64.lld"
 done

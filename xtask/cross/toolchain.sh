@@ -61,8 +61,13 @@ if ! has_own && [ ! -e "$cross/rust/version" ] && command -v rustup >/dev/null; 
   mkdir -p "$cross"
   timeout 300 rustup target add "$triple" >"$cross/rustup.log" 2>&1 || echo "rustup cannot add $triple: taking Debian's library" >&2
 fi
+host="$(rustc -vV | sed -n 's/^host: //p')"
+UPT_LLD="$(rustc --print sysroot)/lib/rustlib/$host/bin/rust-lld"
+export UPT_LLD
 case "$triple" in
   *-apple-darwin) source "$root/xtask/cross/macos.sh" ;;
+  aarch64-linux-android) source "$root/xtask/cross/android.sh" ;;
+  x86_64-pc-windows-msvc) source "$root/xtask/cross/msvc.sh" ;;
 esac
 if ! has_own; then
   if [ ! -e "$cross/rust/version" ]; then

@@ -42,6 +42,12 @@ fn of(platform: Platform) -> Option<Cross> {
             system: ["Darwin", "arm64"],
             wheel: "macosx_11_0_arm64",
         }),
+        Platform::MacosX64 => Some(Cross {
+            triple: "x86_64-apple-darwin",
+            prefix: "",
+            system: ["Darwin", "x86_64"],
+            wheel: "macosx_10_12_x86_64",
+        }),
         Platform::LinuxX64 => None,
     }
 }
@@ -75,6 +81,40 @@ pub fn build(workspace: &Workspace, platform: Platform, packages: &str) -> Resul
     command.env("UPT_PYTHON", workspace.venv_program("python"));
     run_checked(workspace, &label, &mut command)?;
     Ok(workspace.path(&format!("target/cross/build/{triple}/release")))
+}
+
+/// A platform whose C library is in no registry: what links for it, and why that is no package.
+#[derive(Clone, Copy)]
+pub struct Linked {
+    pub name: &'static str,
+    triple: &'static str,
+    lacks: &'static str,
+}
+
+pub const LINKED: [Linked; 2] = [
+    Linked {
+        name: "windows-msvc",
+        triple: "x86_64-pc-windows-msvc",
+        lacks: "Microsoft's C runtime is in no package registry, and stand-ins for it are not for users; the package of windows-x64 has an upt.lib \
+                for hosts of that toolchain",
+    },
+    Linked {
+        name: "android-arm64",
+        triple: "aarch64-linux-android",
+        lacks: "Android's C library and unwinder are in no package registry: with Google's NDK, `cargo build --release -p libupt --target \
+                aarch64-linux-android` and its clang as linker",
+    },
+];
+
+/// How far the library gets; never a package.
+pub fn linked(workspace: &Workspace, platform: Linked) -> Result<bool> {
+    println!("no package for {}: {}", platform.name, platform.lacks);
+    let mut command = workspace.bash("tests/cross/check.sh");
+    command
+        .arg(platform.triple)
+        .env("UPT_LIB_DIR", &workspace.release);
+    run_checked(workspace, "tests/cross/check.sh", &mut command)?;
+    Ok(false)
 }
 
 /// `upt.lib`, which hosts of Microsoft's toolchain link against, into `folder`.

@@ -34,7 +34,8 @@ pub struct Options {
     #[arg(long, conflicts_with_all = ["unity", "wheel", "platform"])]
     godot: bool,
     /// For another platform, with its ONNX Runtime: built here, on Linux x86-64, for Windows, Linux arm64 and macOS (which never ran). `web`: the npm package.
-    /// `crates`: the library and its layers as Rust's registry takes them. `sdist`: the source as Python's does.
+    /// `crates`: the library and its layers as Rust's registry takes them. `sdist`: the source as Python's does. `windows-msvc` and `android-arm64`: no
+    /// package, but how far the library gets, and what is missing.
     #[arg(long, value_parser = wanted)]
     platform: Option<Wanted>,
     /// Folder for the result.
@@ -46,6 +47,7 @@ pub struct Options {
 #[derive(Clone, Copy)]
 enum Wanted {
     Native(Platform),
+    Linked(cross::Linked),
     Web,
     Crates,
     Sdist,
@@ -56,7 +58,10 @@ fn wanted(text: &str) -> Result<Wanted, String> {
         "web" => Ok(Wanted::Web),
         "crates" => Ok(Wanted::Crates),
         "sdist" => Ok(Wanted::Sdist),
-        name => Platform::from_str(name, false).map(Wanted::Native),
+        name => match cross::LINKED.iter().find(|one| one.name == name) {
+            Some(&linked) => Ok(Wanted::Linked(linked)),
+            None => Platform::from_str(name, false).map(Wanted::Native),
+        },
     }
 }
 
@@ -79,6 +84,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         Some(Wanted::Sdist) => {
             return finish(workspace, wheel::source(workspace, &out)?);
         }
+        Some(Wanted::Linked(platform)) => return cross::linked(workspace, platform),
         Some(Wanted::Native(platform)) => platform,
         Some(Wanted::Crates) | None => Platform::host()?,
     };
@@ -102,7 +108,7 @@ fn finish(workspace: &Workspace, made: PathBuf) -> Result<bool> {
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// What is the same on every platform: bundles, examples, licences.
-fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {
+fn shared(workspace: &Workspace, root: &Path, ort_folder: Option<&Path>) -> Result<()> {
     let share = root.join("share/upt");
     for bundle in workspace.bundles()? {
         let name = bundle.file_name().context("a bundle has a name")?;
@@ -117,7 +123,9 @@ fn shared(workspace: &Workspace, root: &Path, ort_folder: &Path) -> Result<()> {
         copy(&workspace.path(name), &doc.join(name))?;
     }
     for name in ["LICENSE", "ThirdPartyNotices.txt"] {
-        copy(&ort_folder.join(name), &doc.join("onnxruntime").join(name))?;
+        if let Some(folder) = ort_folder {
+            copy(&folder.join(name), &doc.join("onnxruntime").join(name))?;
+        }
     }
     script(workspace, LICENCES, &doc.join("THIRD-PARTY.txt"))
 }
@@ -135,7 +143,10 @@ fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathB
         has_program("cmake"),
         "cmake is missing: it writes the find_package and pkg-config files (Debian: apt-get install cmake)"
     );
-    let ort_folder = ort::fetch(workspace, platform, ort::VERSION)?;
+    let ort_folder = match platform.has_wheel() {
+        true => Some(ort::fetch(workspace, platform, ort::VERSION)?),
+        false => None,
+    };
     let name = format!("libupt-{VERSION}-{}", platform.name());
     let root = out.join(&name);
     std::fs::remove_dir_all(&root).ok();
@@ -158,16 +169,22 @@ fn native(workspace: &Workspace, platform: Platform, out: &Path) -> Result<PathB
     if windows && !is_host {
         cross::import_library(workspace, &built, &root.join("lib"))?;
     }
-    if platform == Platform::MacosArm64 && !is_host {
+    if matches!(platform, Platform::MacosArm64 | Platform::MacosX64) && !is_host {
         std::fs::write(root.join("NEVER-RUN.txt"), NEVER_RUN)?;
     }
-    #[cfg(unix)]
-    if !windows {
-        std::os::unix::fs::symlink(format!("../lib/{onnx}"), root.join("bin").join(onnx))?;
+    if let Some(ort_folder) = &ort_folder {
+        #[cfg(unix)]
+        if !windows {
+            std::os::unix::fs::symlink(format!("../lib/{onnx}"), root.join("bin").join(onnx))?;
+        }
+        let folder = if windows { "bin" } else { "lib" };
+        copy(&ort_folder.join(onnx), &root.join(folder).join(onnx))?;
+    } else {
+        println!(
+            "left out: ONNX Runtime, which has no wheel for this platform; bundles without a network need none"
+        );
     }
-    let folder = if windows { "bin" } else { "lib" };
-    copy(&ort_folder.join(onnx), &root.join(folder).join(onnx))?;
-    shared(workspace, &root, &ort_folder)?;
+    shared(workspace, &root, ort_folder.as_deref())?;
     let file = out.join(format!("{name}.tar.gz"));
     archive::pack(out, &name, &file, archive::time(workspace))?;
     Ok(file)
@@ -217,6 +234,8 @@ fn godot(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     let name = format!("libupt-godot-{VERSION}-{}.zip", host.name());
     let file = out.join(&name);
     std::fs::copy(out.join("godot").join(&name), &file)?;
+    let icon = "libupt-godot-icon.png";
+    std::fs::copy(out.join("godot").join(icon), out.join(icon))?;
     Ok(file)
 }
 

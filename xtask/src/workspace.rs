@@ -110,7 +110,7 @@ impl Workspace {
 pub fn library(platform: Platform) -> &'static str {
     match platform {
         Platform::WindowsX64 => "upt.dll",
-        Platform::MacosArm64 => "libupt.dylib",
+        Platform::MacosArm64 | Platform::MacosX64 => "libupt.dylib",
         Platform::LinuxX64 | Platform::LinuxArm64 => "libupt.so",
     }
 }

@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 /// The version that the library is tested with.
 pub const VERSION: &str = "1.31.1";
 
-/// Platforms with a wheel.
+/// Platforms that libupt is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Platform {
     #[value(name = "linux-x64", alias = "linux-x86_64")]
@@ -24,6 +24,9 @@ pub enum Platform {
     WindowsX64,
     #[value(name = "macos-arm64")]
     MacosArm64,
+    /// Without a wheel of the tested version.
+    #[value(name = "macos-x64", alias = "macos-x86_64")]
+    MacosX64,
 }
 
 impl Platform {
@@ -50,7 +53,13 @@ impl Platform {
             Self::LinuxArm64 => "linux-arm64",
             Self::WindowsX64 => "windows-x64",
             Self::MacosArm64 => "macos-arm64",
+            Self::MacosX64 => "macos-x64",
         }
+    }
+
+    /// Whether ONNX Runtime has a wheel for it. Where it has none, bundles without a network run.
+    pub fn has_wheel(self) -> bool {
+        WHEELS.iter().any(|wheel| wheel.1 == self)
     }
 
     /// The wheel's platform tag.
@@ -60,6 +69,7 @@ impl Platform {
             Self::LinuxArm64 => "manylinux_2_28_aarch64",
             Self::WindowsX64 => "win_amd64",
             Self::MacosArm64 => "macosx_14_0_arm64",
+            Self::MacosX64 => "macosx_14_0_x86_64",
         }
     }
 
@@ -68,7 +78,7 @@ impl Platform {
         match self {
             Self::LinuxX64 | Self::LinuxArm64 => format!("libonnxruntime.so.{version}"),
             Self::WindowsX64 => "onnxruntime.dll".into(),
-            Self::MacosArm64 => format!("libonnxruntime.{version}.dylib"),
+            Self::MacosArm64 | Self::MacosX64 => format!("libonnxruntime.{version}.dylib"),
         }
     }
 
@@ -77,7 +87,7 @@ impl Platform {
         match self {
             Self::LinuxX64 | Self::LinuxArm64 => "libonnxruntime.so",
             Self::WindowsX64 => "onnxruntime.dll",
-            Self::MacosArm64 => "libonnxruntime.dylib",
+            Self::MacosArm64 | Self::MacosX64 => "libonnxruntime.dylib",
         }
     }
 }
@@ -167,6 +177,12 @@ pub fn fetch(
 }
 
 fn checksum(platform: Platform, version: &str) -> Result<&'static str> {
+    if !platform.has_wheel() {
+        bail!(
+            "ONNX Runtime has no wheel for {}: build it and set ORT_DYLIB_PATH to its library",
+            platform.name()
+        );
+    }
     let mut of_platform = WHEELS.iter().filter(|wheel| wheel.1 == platform);
     let found = of_platform.clone().find(|wheel| wheel.0 == version);
     found.map(|wheel| wheel.2).with_context(|| {
@@ -196,7 +212,10 @@ mod tests {
 
     #[test]
     fn every_platform_has_a_checksum_for_the_tested_version() {
-        for &platform in Platform::value_variants() {
+        let mut with_wheel = Platform::value_variants().to_vec();
+        with_wheel.retain(|&platform| platform.has_wheel());
+        assert_eq!(with_wheel.len(), 4);
+        for platform in with_wheel {
             let hash = checksum(platform, VERSION).unwrap();
             assert_eq!(hash.len(), 64, "{}", platform.name());
         }
@@ -206,6 +225,8 @@ mod tests {
     fn an_unknown_version_names_those_that_are_known() {
         let error = checksum(Platform::LinuxX64, "0.1").unwrap_err();
         assert!(error.to_string().contains(VERSION), "{error}");
+        let error = checksum(Platform::MacosX64, VERSION).unwrap_err();
+        assert!(error.to_string().contains("has no wheel"), "{error}");
     }
 
     /// A download that is not the published wheel leaves no library behind, and a later fetch starts again.

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The linker for macOS that rustc calls with the flavor `ld64.lld`: LLVM's, as Rust's own toolchain brings it (UPT_MACOS_LLD).
+# LLVM's linker as Rust's own toolchain brings it (UPT_LLD), which rustc calls with a flavor of it: for macOS and Android.
 set -euo pipefail
 words=()
 for word in "$@"; do
@@ -9,4 +9,4 @@ for word in "$@"; do
     *) words+=("$word") ;;
   esac
 done
-exec "$UPT_MACOS_LLD" "${words[@]}"
+exec "$UPT_LLD" "${words[@]}"
