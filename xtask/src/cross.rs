@@ -109,6 +109,7 @@ pub const LINKED: [Linked; 2] = [
 /// How far the library gets; never a package.
 pub fn linked(workspace: &Workspace, platform: Linked) -> Result<bool> {
     println!("no package for {}: {}", platform.name, platform.lacks);
+    workspace.build()?;
     let mut command = workspace.bash("tests/cross/check.sh");
     command
         .arg(platform.triple)
@@ -131,6 +132,14 @@ pub fn windows(workspace: &Workspace) -> Result<Outcome> {
 /// `cargo xtask test --only arm64`.
 pub fn arm64(workspace: &Workspace) -> Result<Outcome> {
     stage(workspace, "arm64", Platform::LinuxArm64)
+}
+
+/// `cargo xtask test --only linked`.
+pub fn linked_stage(workspace: &Workspace) -> Result<Outcome> {
+    if !matches!(Platform::host(), Ok(Platform::LinuxX64)) {
+        return Ok(Outcome::skipped("is linked on Linux x86-64 only"));
+    }
+    counts::script(workspace, "linked", "tests/cross/check.sh", &[])
 }
 
 fn stage(workspace: &Workspace, name: &str, platform: Platform) -> Result<Outcome> {

@@ -76,6 +76,7 @@ pub const NIGHTLY: &[&[&[Stage]]] = &[&[&[
     stage("haptics", "a day of simulated haptics, or what fits into 20 minutes", system::NATIVE, Cargo(HAPTICS)),
     stage("races", "what threads share: Miri, ThreadSanitizer", "", Script("tests/races/run.sh nightly")),
     stage("arm64", "Linux arm64, run by qemu", system::ARM64, Function(cross::arm64)),
+    stage("linked", "macOS, MSVC and Android: linked, the files read, MSVC's run by Wine", system::WINDOWS, Function(cross::linked_stage)),
 ]]];
 
 impl Stage {
