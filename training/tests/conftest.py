@@ -37,12 +37,17 @@ def mesh_path(data) -> Path:
 
 @pytest.fixture(scope="session")
 def trained(data, mesh_path, tmp_path_factory) -> Path:
-    """A replay run made here. Where it ends is this processor's rounding: only its loss may be judged."""
+    """A short replay run made here. Where it ends is this processor's rounding: only its loss may be judged."""
     out = tmp_path_factory.mktemp("run") / "replay"
+    config = out.with_name("tiny-replay.toml")
+    text = (CONFIGS / "tiny-replay.toml").read_text()
+    whole, short = "\nepochs = 4\nautoregressive_epochs = 24\n", "\nepochs = 3\nautoregressive_epochs = 5\n"
+    assert whole in text
+    config.write_text(text.replace(whole, short))
     arguments = [
         "train",
         "--config",
-        str(CONFIGS / "tiny-replay.toml"),
+        str(config),
         "--data",
         str(data),
         "--mesh",

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 
@@ -16,6 +17,17 @@ from upt_training.scaling_report import Reference, read_reference, table
 
 def paths(data, mesh_path) -> list[str]:
     return ["--data", str(data), "--mesh", str(mesh_path)]
+
+
+def shortened(folder):
+    """The configurations, with a recipe of 4 epochs in place of 60: a run has a step of each at least."""
+    short = folder / "configs"
+    shutil.copytree(CONFIGS, short)
+    recipe = short / "plain.toml"
+    text, epochs = recipe.read_text(), "\nepochs = 45\nautoregressive_epochs = 15\n"
+    assert epochs in text
+    recipe.write_text(text.replace(epochs, "\nepochs = 3\nautoregressive_epochs = 1\n"))
+    return str(short)
 
 
 def test_bench_writes_a_row_for_each_lever_of_the_configuration(data, mesh_path, tmp_path, capsys):
@@ -40,7 +52,8 @@ def test_scaling_keeps_what_is_done_and_writes_table_and_plot(data, mesh_path, t
     out, page = tmp_path / "out", tmp_path / "docs/page.md"
     (tmp_path / "docs/images").mkdir(parents=True)
     page.write_text("<!-- scaling: begin -->\nold\n<!-- scaling: end -->\n")
-    command = ["scaling", *paths(data, mesh_path), "--configs", str(CONFIGS), "--out", str(out), "--inputs", "plain"]
+    configs = shortened(tmp_path)
+    command = ["scaling", *paths(data, mesh_path), "--configs", configs, "--out", str(out), "--inputs", "plain"]
     command += ["--core-minutes", "0.02", "--cases", "2"]
     assert main([*command, "--report-only"]) == 2 and "no finished run" in capsys.readouterr().err
     assert main([*command, "--sizes", "7"]) == 2 and "'7' is not one of" in capsys.readouterr().err
@@ -60,7 +73,7 @@ def test_an_interrupted_run_of_scaling_goes_on_and_ends_as_planned(data, mesh_pa
         "scaling",
         *paths(data, mesh_path),
         "--configs",
-        str(CONFIGS),
+        shortened(tmp_path),
         "--out",
         str(tmp_path),
         "--inputs",
@@ -107,14 +120,14 @@ def test_the_table_of_runs_says_what_a_run_got(trained, tmp_path):
     command = [sys.executable, tables, "runs", trained, "--evaluation", other, "--page", page]
     subprocess.run(command, check=True, capture_output=True)
     cells = [cell.strip() for cell in page.read_text().splitlines()[3].strip("|").split("|")]
-    assert cells[:5] == ["`tiny-replay`", "10,691", "1,400", "1,400", "22,400"] and float(cells[5]) >= 0
-    assert cells[6].endswith("after step 1,400)") and cells[8:] == ["2.0000", "-", "-"]
+    assert cells[:5] == ["`tiny-replay`", "10,691", "400", "400", "6,400"] and float(cells[5]) >= 0
+    assert cells[6].endswith("after step 400)") and cells[8:] == ["2.0000", "-", "-"]
     own = [{"index": i, "bundle": {"mse_mm2": 0.5, "max_mm": 3.0}} for i in (1, 3)]
     other.with_name("own.json").write_text(json.dumps({"bundle": "own", "cases": own}))
     command[3] = f"{trained}={other.with_name('own.json')}"
     subprocess.run(command, check=True, capture_output=True)
     cells = [cell.strip() for cell in page.read_text().splitlines()[3].strip("|").split("|")]
-    assert cells[6:8] == ["0.5000 (2, after step 1,400)", "3.00"]
+    assert cells[6:8] == ["0.5000 (2, after step 400)", "3.00"]
 
 
 def test_a_reference_that_is_no_evaluation_names_its_file(tmp_path):
