@@ -138,6 +138,17 @@ fn come(frames: &mut Vec<Frame>, site: &Site, over: [f32; 3]) {
     go(frames, false, 6, high.to_array(), over);
 }
 
+/// What has been cut free comes to rest; then the ball presses it 1.5 mm deep, grasps it and lifts it by 4.5 mm. What a grasp catches of tissue that swings by
+/// millimetres is a matter of chance, in the reference solver as well.
+fn lift(frames: &mut Vec<Frame>, site: &Site, aside: f32) {
+    let [over, on, up] = [5.0, -1.5, 3.0].map(|above| site.place(0.0, aside, BALL_MM + above));
+    go(frames, false, 10, over, over);
+    go(frames, false, 4, over, on);
+    go(frames, true, 1, on, on);
+    go(frames, true, 8, on, up);
+    go(frames, true, 8, up, up);
+}
+
 /// 24 mm long, 8 mm deep, in pieces of 2 mm.
 fn slit(site: &Site, stroke: u32) -> Vec<Frame> {
     let edge = |piece: i32| site.upright(2.0 * piece as f32 - 12.0, 0.0, 8.0);
@@ -178,7 +189,7 @@ fn incise(site: &Site) -> Vec<Frame> {
     frames
 }
 
-/// A flap of 20 x 12 mm, 5 mm thick, hangs by one side; a grasp lifts its free edge by 4 mm.
+/// A flap of 20 x 12 mm, 5 mm thick, hangs by one side; a grasp lifts its free edge.
 fn flap(site: &Site) -> Vec<Frame> {
     let mut frames = vec![
         cut(
@@ -204,15 +215,7 @@ fn flap(site: &Site) -> Vec<Frame> {
         ]
     };
     frames.push(cut(3, under(-1.0), under(12.0)));
-    let (over, on) = (
-        site.place(0.0, 4.0, 6.0),
-        site.place(0.0, 4.0, BALL_MM - 0.5),
-    );
-    let up = site.place(0.0, 4.0, BALL_MM + 4.0);
-    go(&mut frames, false, 3, over, on);
-    go(&mut frames, true, 1, on, on);
-    go(&mut frames, true, 8, on, up);
-    go(&mut frames, true, 8, up, up);
+    lift(&mut frames, site, 4.0);
     frames
 }
 
@@ -242,7 +245,7 @@ fn resect(site: &Site) -> Vec<Frame> {
     frames
 }
 
-/// A plug of 10 mm across is cut free 9 mm deep but for its base; a grasp pulls it by 4 mm.
+/// A plug of 10 mm across is cut free 9 mm deep but for its base; a grasp pulls it.
 fn biopsy(site: &Site) -> Vec<Frame> {
     let edge = |piece: i32| {
         let (sin, cos) = (std::f32::consts::TAU * piece as f32 / 24.0).sin_cos();
@@ -258,15 +261,7 @@ fn biopsy(site: &Site) -> Vec<Frame> {
             ..Frame::default()
         })
         .collect();
-    let (over, on) = (
-        site.place(0.0, 0.0, 6.0),
-        site.place(0.0, 0.0, BALL_MM - 0.5),
-    );
-    let up = site.place(0.0, 0.0, BALL_MM + 4.0);
-    go(&mut frames, false, 3, over, on);
-    go(&mut frames, true, 1, on, on);
-    go(&mut frames, true, 8, on, up);
-    go(&mut frames, true, 8, up, up);
+    lift(&mut frames, site, 0.0);
     frames
 }
 
