@@ -187,3 +187,55 @@ fn a_thin_spatula_presses_a_lip_beside_the_other() {
         );
     }
 }
+
+/// How often the surface as it is goes around a point: 1 in the tissue, 0 outside (Van Oosterom and Strackee 1983).
+fn winding(scene: &Scene, point: Vector) -> f32 {
+    scene.update_surface().unwrap();
+    let (count, triangles) = (scene.with_surface(|surface| {
+        let count = surface.rest.as_flattened().len();
+        (count, surface.triangles.to_vec())
+    }))
+    .unwrap();
+    let mut at = vec![0.0; count];
+    scene.surface_positions(&mut at).unwrap();
+    let angles = triangles.iter().map(|corners| {
+        let [a, b, c] = corners.map(|v| Vector::from_slice(&at[3 * v as usize..]) - point);
+        let [x, y, z] = [a, b, c].map(Vector::length);
+        let product = x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y;
+        2.0 * a.dot(b.cross(c)).atan2(product)
+    });
+    angles.sum::<f32>() / (4.0 * std::f32::consts::PI)
+}
+
+/// A small ball that is put into the tissue behind a wall of a slit is told of, and comes out. (It stayed there, with a force of 0 and no flag: what looked for
+/// tools in the tissue knew the intact body's surface alone.)
+#[test]
+fn a_ball_behind_a_wall_is_in_the_tissue() {
+    let options = SceneOptions {
+        step_s: 0.02,
+        ..super::cuts::options()
+    };
+    let scene = Scene::new(super::cuts::liver(), &options).unwrap();
+    scene
+        .cut(0, 2, &super::cuts::slit(&scene, 0.0, 15.0))
+        .unwrap();
+    let (at, normal) = site(&scene);
+    let (at, along) = (Vector::from(at), normal.any_orthonormal_vector());
+    let across = normal.cross(along);
+    let start = scene.save().unwrap();
+    for [aside, ahead, depth] in [[3.0, 0.0, 5.0], [-3.0, 5.0, 6.0], [3.5, -6.0, 7.0]] {
+        scene.restore(&start).unwrap();
+        let place = at + across * aside + along * ahead - normal * depth;
+        let tool = ball(1.5, place.to_array());
+        assert!(winding(&scene, place) > 0.9, "{aside}, {ahead}, {depth}");
+        for frame in 0..12 {
+            step(&scene, std::slice::from_ref(&tool));
+            let (flags, force) = (scene.stats().flags, size(readings(&scene)[0].force));
+            let seen = flags & flag::DEEP != 0 || force > 20.0;
+            println!("{aside}, {ahead}, {depth}, {frame}: {force} mN, {flags:x}");
+            assert!(seen, "{aside}, {ahead}, {depth}, {frame}: {force} mN");
+        }
+        let left = winding(&scene, place);
+        assert!(left < 0.1, "{aside}, {ahead}, {depth}: {left}");
+    }
+}

@@ -1,8 +1,8 @@
 //! The mesh of a body that has been cut.
 
-use topology::{Body, Changes};
+use topology::{Body, Changes, Skin};
 
-use super::mesh::{Mesh, Opened, unique};
+use super::mesh::{Bounds, Mesh, Opened, unique};
 use super::node_set::NodeSet;
 use field::error::Result;
 use field::memory;
@@ -61,7 +61,8 @@ impl Mesh {
             stiffness.push(self.stiffness_of(element));
             region.extend(self.region.get(element.parent as usize));
         }
-        let touchable = body.touchable_of(self.domain_sides(body)?)?;
+        let skin = body.skin()?;
+        let touchable = body.touchable_of(self.domain_sides(body)?, &skin)?;
         let domain_faces = memory::copied(touchable.faces.as_flattened(), WHAT)?;
         let most = domain_faces.len() + 4 * touchable.corners.len();
         let domain_nodes = memory::collected(most, touchable.nodes(), WHAT)?;
@@ -109,6 +110,7 @@ impl Mesh {
                 corners: touchable.corners,
                 pieces: touchable.pieces,
                 first_wall: touchable.first_wall,
+                bounds: self.bounds(body, &skin)?,
                 ..Opened::default()
             },
         })
@@ -118,6 +120,27 @@ impl Mesh {
     pub fn stiffness_of(&self, element: &topology::Element) -> f32 {
         let own = self.stiffness.get(element.parent as usize).copied();
         own.unwrap_or(1.0) * element.stiffness * element.share as f32
+    }
+
+    fn bounds(&self, body: &Body, skin: &Skin) -> Result<Bounds> {
+        let border = match self.opened.border.get() {
+            Some(border) => border,
+            None => {
+                let border = body.mesh().border(|_| true)?;
+                self.opened.border.get_or_init(|| border)
+            }
+        };
+        let topology::Bounds {
+            faces,
+            corners,
+            pieces,
+        } = body.bounds(border, skin)?;
+        Ok(Bounds {
+            nodes: unique(memory::copied(faces.as_flattened(), WHAT)?),
+            faces,
+            corners,
+            pieces,
+        })
     }
 
     fn domain_sides(&self, body: &Body) -> Result<&[(u32, u8)]> {

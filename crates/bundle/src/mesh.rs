@@ -63,6 +63,22 @@ pub struct Opened {
     pub pieces: Vec<[u32; 3]>,
     /// Those from here on are walls: a blade has gone through elements there.
     pub first_wall: usize,
+    /// The mesh's border as faces of elements, likewise.
+    #[held(skip)]
+    pub(super) border: OnceLock<Vec<(u32, u8)>>,
+    pub bounds: Bounds,
+}
+
+/// All that bounds the tissue of a cut body ([`topology::Bounds`]); none where nothing has been cut: the boundary triangles do.
+#[derive(Debug, Default, HeldBytes)]
+pub struct Bounds {
+    /// Nodes of the faces, ascending.
+    pub nodes: Vec<u32>,
+    pub faces: Vec<[u32; 3]>,
+    /// Nodes and weights.
+    pub corners: Vec<([u32; 4], [f32; 4])>,
+    /// Triangles of corners.
+    pub pieces: Vec<[u32; 3]>,
 }
 
 impl Mesh {

@@ -300,6 +300,11 @@ impl Samples {
         (b - a).cross(c - a).normalize_or_zero()
     }
 
+    /// Whether a blade has laid walls open.
+    pub fn has_walls(&self) -> bool {
+        self.inner.first_wall < self.face_count()
+    }
+
     /// Whether a face is a wall that a blade has laid open.
     pub fn is_wall(&self, face: usize) -> bool {
         face >= self.inner.first_wall
@@ -307,7 +312,7 @@ impl Samples {
 
     /// Whether a row is on one.
     pub fn is_on_wall(&self, row: u32) -> bool {
-        self.inner.first_wall < self.face_count() && self.is_wall(self.face_of(row))
+        self.has_walls() && self.is_wall(self.face_of(row))
     }
 
     /// Number of sampled faces.

@@ -52,7 +52,7 @@ pub use push::Push;
 pub use rest::RestMesh;
 pub use surface::{Skin, SkinTriangle, Surface, SurfaceChange, Vertex};
 pub use sweep::Sweep;
-pub use touchable::{Corner, Touchable};
+pub use touchable::{Bounds, Corner, Touchable};
 
 /// A point, mm.
 pub type Point = [f64; 3];

@@ -5,7 +5,7 @@ use crate::body::Body;
 use crate::polygon::normal;
 use crate::rest::{FACES, dot};
 use crate::room::{copied, push, room};
-use crate::surface::{NONE, SkinTriangle, Vertex};
+use crate::surface::{NONE, Skin, SkinTriangle, Vertex};
 
 /// Nodes of one element and weights; places that are not needed repeat the first node with weight 0.
 pub type Corner = ([u32; 4], [f32; 4]);
@@ -26,6 +26,14 @@ pub struct Touchable {
     pub first_wall: usize,
 }
 
+/// All that bounds the tissue of a body: faces of elements that nothing has touched, by their nodes, and triangles of corners, outward.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bounds {
+    pub faces: Vec<[u32; 3]>,
+    pub corners: Vec<Corner>,
+    pub pieces: Vec<[u32; 3]>,
+}
+
 impl Touchable {
     /// Nodes of all of it, in no order and more than once.
     pub fn nodes(&self) -> impl Iterator<Item = u32> {
@@ -44,25 +52,49 @@ impl Body {
         &self,
         is_wanted: impl Fn([u32; 3]) -> bool,
     ) -> Result<Touchable, TopologyError> {
-        self.touchable_of(&self.mesh().border(is_wanted)?)
+        self.touchable_of(&self.mesh().border(is_wanted)?, &self.skin()?)
     }
 
-    /// The same for faces of the mesh's border, an element and a face each ([`crate::RestMesh::border`]).
+    /// All that bounds the tissue, of the mesh's whole border and the body's skin.
     ///
     /// # Errors
     /// No memory.
-    pub fn touchable_of(&self, border: &[(u32, u8)]) -> Result<Touchable, TopologyError> {
-        let mesh = self.mesh();
+    pub fn bounds(&self, border: &[(u32, u8)], skin: &Skin) -> Result<Bounds, TopologyError> {
+        let mut corners = room(skin.vertices.len())?;
+        corners.extend(skin.vertices.iter().map(corner_of));
+        let mut pieces = room(skin.triangles.len())?;
+        pieces.extend(skin.triangles.iter().map(|triangle| triangle.corners));
+        Ok(Bounds {
+            faces: self.whole_faces(border)?,
+            corners,
+            pieces,
+        })
+    }
+
+    /// Those faces of the mesh's border, by their nodes, whose elements nothing has touched.
+    fn whole_faces(&self, border: &[(u32, u8)]) -> Result<Vec<[u32; 3]>, TopologyError> {
         let mut faces = room(border.len())?;
         for &(element, face) in border {
             if !self.cells.contains_key(&element) {
-                let own = mesh.tet(element);
+                let own = self.mesh().tet(element);
                 faces.push(FACES[usize::from(face)].map(|corner| own[corner]));
             }
         }
+        Ok(faces)
+    }
+
+    /// The same as [`Body::touchable`] for faces of the mesh's border, an element and a face each ([`crate::RestMesh::border`]), and the body's skin.
+    ///
+    /// # Errors
+    /// No memory.
+    pub fn touchable_of(
+        &self,
+        border: &[(u32, u8)],
+        skin: &Skin,
+    ) -> Result<Touchable, TopologyError> {
+        let faces = self.whole_faces(border)?;
         let mut wanted = copied(border)?;
         wanted.sort_unstable();
-        let skin = self.skin()?;
         let corner_at = |corner: &u32| {
             let vertex = &skin.vertices[*corner as usize];
             self.rest_of(vertex)

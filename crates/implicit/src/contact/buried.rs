@@ -17,6 +17,8 @@ const PIERCED_MM: f32 = 4.0;
 /// A way out to a rim of the touchable surface that makes less than this (cosine) with the normal of the face there may go along the face: the
 /// point lies beside the rim, in the tissue or not. In a fold the way out leans too, but leads to no rim.
 const IN_DOUBT: f32 = 0.5;
+/// A wall may have come so far through the one on its other side, mm.
+const BESIDE_MM: f32 = 1.5;
 /// Ways out of the solid are looked for as far as this, mm.
 const LONGEST_MM: f32 = 30.0;
 
@@ -55,27 +57,91 @@ impl Buried {
         is_inside: impl FnMut(Vector) -> bool,
     ) -> Option<Buried> {
         let least = 0.0;
-        deepest(tool, (samples, isa), state, least, is_inside)
-            .filter(|buried| buried.depth < PIERCED_MM)
+        let deepest = match samples.has_walls() {
+            true => deepest_by_walls(tool, samples, state, least, is_inside),
+            false => deepest(tool, (samples, isa), state, least, is_inside),
+        };
+        deepest.filter(|buried| buried.depth < PIERCED_MM)
     }
 
     /// Where the deepest probe of a tool comes out through the touchable surface; none where no probe lies in the tissue, or only
-    /// beneath a part of the surface that no tool touches, or where the tool went in through such a part. Beside the rims of a surface with lips none does.
+    /// beneath a part of the surface that no tool touches, or where the tool went in through such a part.
     pub fn find(
         (body, pose): (&Body, &Pose),
-        (samples, has_lips): (&Samples, bool),
+        samples: &Samples,
         mut solid: Solid<'_>,
         isa: Isa,
     ) -> Option<Buried> {
         let least = LEAST_MM.min(body.size());
-        let tool = (body, pose);
-        let buried = deepest(tool, (samples, isa), solid.state, least, |_| !has_lips)?;
+        let (tool, state) = ((body, pose), solid.state);
+        let buried = match samples.has_walls() {
+            true => deepest_by_walls(tool, samples, state, least, |point| solid.is_inside(point)),
+            false => deepest(tool, (samples, isa), state, least, |_| true),
+        }?;
         let point = buried.point;
         let is_in = !solid.is_nearer(point, buried.depth)
             && solid.is_inside(point)
             && !solid.is_left_elsewhere(tool, point, samples.nodes());
         is_in.then_some(buried)
     }
+}
+
+/// The deepest of a tool's probes that lie in a body with walls, more than `least` mm from its touchable surface. The two walls of a slit lie on each other, and
+/// the nearest corner may be of the wrong one: of all triangles the nearest that has the probe behind it counts.
+fn deepest_by_walls(
+    (body, pose): (&Body, &Pose),
+    samples: &Samples,
+    state: State<'_>,
+    least: f32,
+    mut is_inside: impl FnMut(Vector) -> bool,
+) -> Option<Buried> {
+    let mut deepest: Option<Buried> = None;
+    let mut last = None;
+    for probe in body.probes() {
+        if last.replace(probe) == Some(probe) {
+            continue;
+        }
+        let point = pose.transform_point(probe);
+        let depth = deepest.map_or(least, |buried| buried.depth);
+        if let Some(found) = behind(point, samples, state)
+            && found.depth > depth
+            && is_inside(point)
+        {
+            deepest = Some(found);
+        }
+    }
+    deepest
+}
+
+/// The way out of a point through the nearest triangle that has it behind itself; none where another triangle is clearly nearer.
+fn behind(point: Vector, samples: &Samples, state: State<'_>) -> Option<Buried> {
+    let (mut nearest, mut best) = (f32::MAX, None);
+    let mut length = f32::MAX;
+    for face in 0..samples.face_count() {
+        let places = samples.corners(face);
+        let [a, b, c] = places.map(|at| samples.corner_at(at, |node| state.position(node)));
+        let weights = nearest_weights(point, [a, b, c]);
+        let [u, v, w] = weights;
+        let away = a * u + b * v + c * w - point;
+        let square = away.length_squared();
+        nearest = nearest.min(square);
+        if square < length && away.dot((b - a).cross(c - a)) > 0.0 {
+            (length, best) = (square, Some((face, weights, away)));
+        }
+    }
+    let (face, [_, v, w], out) = best?;
+    let is_other = length.sqrt() > nearest.sqrt() + BESIDE_MM;
+    if is_other || length > LONGEST_MM * LONGEST_MM {
+        return None;
+    }
+    let i = (v * LATTICE as f32).round() as u32;
+    let j = (w * LATTICE as f32).round() as u32;
+    Some(Buried {
+        out: out.try_normalize()?,
+        depth: out.length(),
+        row: samples.lattice_row(face, [i, j.min(LATTICE - i)])?,
+        point,
+    })
 }
 
 /// The deepest of a tool's probes that lie more than `least` mm below the touchable surface. Of one that may lie beside a rim of that surface
@@ -189,11 +255,7 @@ fn below(
         point,
     };
     let is_along = along_normal < IN_DOUBT * buried.depth * face_outward.length();
-    // At a wall it may lie in the slit before it.
-    let mut around = samples.faces_at(nearest).iter();
-    let is_at_wall = around.any(|face| samples.is_wall(*face as usize));
-    let in_doubt = is_at_wall || (is_along && is_on_rim(samples, face, weights));
-    Some((buried, in_doubt))
+    Some((buried, is_along && is_on_rim(samples, face, weights)))
 }
 
 /// Whether a point of a face lies on an edge that no other face has, or at a corner of one.

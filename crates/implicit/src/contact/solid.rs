@@ -17,29 +17,47 @@ const OBLIQUE: Vector = Vector::new(0.365_148, 0.547_723, 0.752_773);
 /// Rays lean this much to it: along edges of a regular mesh they would hit none of the faces there.
 const TILT: f32 = 1e-3;
 
-/// On which sides of two planes through a ray each node of the surface lies, by node: bits for above and below the one, and for above and below
+/// On which sides of two planes through a ray each node of the surface lies, by node, and behind them the corners of a cut body: bits for above and below the one, and for above and below
 /// the other. Faces whose corners share a bit are not crossed.
 #[derive(Debug, HeldBytes)]
 pub(super) struct Sides(Vec<u8>);
 
 impl Sides {
-    /// Of a mesh with `count` nodes.
+    /// Of a mesh.
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
-    pub fn new(count: usize) -> Result<Sides> {
+    pub fn of(mesh: &Mesh) -> Result<Sides> {
+        Self::new(mesh.node_count() + mesh.opened.bounds.corners.len())
+    }
+
+    fn new(count: usize) -> Result<Sides> {
         let mut sides = memory::room(count, "the sides of a ray")?;
         sides.resize(count, 0);
         Ok(Sides(sides))
     }
 }
 
-/// The surface of a body `[F,3]` and its nodes, where they are in a state.
+/// A corner of a cut body's surface: nodes and weights.
+type Corner = ([u32; 4], [f32; 4]);
+
+/// The surface of a body, where it is in a state: faces of nodes, and of a cut body triangles of corners besides.
 pub(super) struct Solid<'a> {
-    pub nodes: &'a [u32],
-    pub faces: &'a [u32],
+    nodes: &'a [u32],
+    faces: &'a [[u32; 3]],
+    corners: &'a [Corner],
+    pieces: &'a [[u32; 3]],
     pub state: State<'a>,
-    pub sides: &'a mut Sides,
+    sides: &'a mut Sides,
+}
+
+/// What a ray has crossed.
+#[derive(Clone, Copy)]
+enum Part {
+    /// By its nodes.
+    Face([u32; 3]),
+    /// By its corners.
+    Piece([u32; 3]),
 }
 
 /// Where a ray crosses the surface.
@@ -48,14 +66,21 @@ pub(super) struct Crossing {
     pub along: f32,
     /// Whether the ray leaves the solid there.
     pub leaves: bool,
-    face: [u32; 3],
+    part: Part,
 }
 
 impl<'a> Solid<'a> {
     pub fn of(mesh: &'a Mesh, state: State<'a>, sides: &'a mut Sides) -> Solid<'a> {
+        let bounds = &mesh.opened.bounds;
+        let (nodes, faces) = match bounds.faces.is_empty() {
+            true => (&mesh.surface_nodes, mesh.surface_faces.as_chunks().0),
+            false => (&bounds.nodes, bounds.faces.as_slice()),
+        };
         Solid {
-            nodes: &mesh.surface_nodes,
-            faces: &mesh.surface_faces,
+            nodes,
+            faces,
+            corners: &bounds.corners,
+            pieces: &bounds.pieces,
             state,
             sides,
         }
@@ -63,8 +88,9 @@ impl<'a> Solid<'a> {
 
     /// Whether a node of the surface is clearly nearer to a point than `depth`, mm.
     pub fn is_nearer(&self, point: Vector, depth: f32) -> bool {
-        let nodes = self.nodes.iter();
-        let squares = nodes.map(|node| self.state.position(*node).distance_squared(point));
+        let nodes = self.nodes.iter().map(|node| self.state.position(*node));
+        let places = nodes.chain(self.corners.iter().map(|corner| self.corner_at(corner)));
+        let squares = places.map(|at| at.distance_squared(point));
         depth > CLEARLY * squares.fold(f32::MAX, f32::min).sqrt()
     }
 
@@ -94,17 +120,29 @@ impl<'a> Solid<'a> {
             };
             self.each_crossing(point, ray, |crossing| {
                 if crossing.along < nearest {
-                    (nearest, left) = (crossing.along, Some(crossing.face));
+                    (nearest, left) = (crossing.along, Some(crossing.part));
                 }
             });
             let is_touchable = |node: &u32| touchable.binary_search(node).is_ok();
-            match left {
-                Some(face) if face.iter().all(is_touchable) => return false,
-                Some(_) => is_left = true,
+            let is_out = left.map(|part| match part {
+                Part::Face(nodes) => nodes.iter().all(is_touchable),
+                Part::Piece(corners) => (corners.iter())
+                    .all(|corner| self.corners[*corner as usize].0.iter().all(is_touchable)),
+            });
+            match is_out {
+                Some(true) => return false,
+                Some(false) => is_left = true,
                 None => {}
             }
         }
         is_left
+    }
+
+    /// Where a corner is.
+    fn corner_at(&self, (nodes, weights): &Corner) -> Vector {
+        let places = nodes.iter().zip(weights);
+        let places = places.map(|(node, weight)| self.state.position(*node) * *weight);
+        places.sum()
     }
 
     /// Calls with each crossing of a ray from a point along a unit direction, in no order.
@@ -120,19 +158,19 @@ impl<'a> Solid<'a> {
         };
         let across = frame(ray);
         let (e, f) = (across.y_axis, across.z_axis);
-        for &node in self.nodes {
-            let at = self.state.position(node) - point;
+        let sides = |at: Vector| {
             let side = |x: f32| u8::from(x > 0.0) | u8::from(x < 0.0) << 1;
-            self.sides.0[node as usize] = side(at.dot(e)) | side(at.dot(f)) << 2;
+            side(at.dot(e)) | side(at.dot(f)) << 2
+        };
+        for &node in self.nodes {
+            self.sides.0[node as usize] = sides(self.state.position(node) - point);
+        }
+        let first_corner = self.sides.0.len() - self.corners.len();
+        for (at, corner) in self.corners.iter().enumerate() {
+            self.sides.0[first_corner + at] = sides(self.corner_at(corner) - point);
         }
         let is_beside = |at: [f32; 3]| at.iter().all(|x| *x > 0.0) || at.iter().all(|x| *x < 0.0);
-        for &face in self.faces.as_chunks::<3>().0 {
-            // Most faces lie on one side of a plane through the ray.
-            let [a, b, c] = face.map(|node| self.sides.0[node as usize]);
-            if a & b & c != 0 {
-                continue;
-            }
-            let corners = face.map(|node| self.state.position(node) - point);
+        let mut cross = |part: Part, corners: [Vector; 3]| {
             let [x, y] = [e, f].map(|axis| corners.map(|corner| corner.dot(axis)));
             let side = |i: usize, j: usize| x[i] * y[j] - y[i] * x[j];
             let [u, v, w] = [side(1, 2), side(2, 0), side(0, 1)];
@@ -143,9 +181,26 @@ impl<'a> Solid<'a> {
                     take(Crossing {
                         along,
                         leaves: u > 0.0,
-                        face,
+                        part,
                     });
                 }
+            }
+        };
+        // Most triangles lie on one side of a plane through the ray.
+        let is_missed = |[a, b, c]: [usize; 3]| {
+            let sides = &self.sides.0;
+            sides[a] & sides[b] & sides[c] != 0
+        };
+        for &face in self.faces {
+            if !is_missed(face.map(|node| node as usize)) {
+                let corners = face.map(|node| self.state.position(node) - point);
+                cross(Part::Face(face), corners);
+            }
+        }
+        for &piece in self.pieces {
+            if !is_missed(piece.map(|corner| first_corner + corner as usize)) {
+                let corner = |at: u32| self.corner_at(&self.corners[at as usize]) - point;
+                cross(Part::Piece(piece), piece.map(corner));
             }
         }
     }
@@ -179,9 +234,9 @@ mod tests {
             [0, 2, 3, 1],
             [4, 5, 7, 6],
         ];
-        let faces: Vec<u32> = quads
+        let faces: Vec<[u32; 3]> = quads
             .into_iter()
-            .flat_map(|[a, b, c, d]| [a, b, c, a, c, d])
+            .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
             .collect();
         let (nodes, top): (Vec<u32>, _) = ((0..8).collect(), [2, 3, 6, 7]);
         let mut sides = Sides::new(8).unwrap();
@@ -193,6 +248,8 @@ mod tests {
         let mut solid = Solid {
             nodes: &nodes,
             faces: &faces,
+            corners: &[],
+            pieces: &[],
             state,
             sides: &mut sides,
         };

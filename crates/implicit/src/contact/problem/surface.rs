@@ -25,8 +25,6 @@ pub struct Surface {
     pub(super) search: Search,
     /// Room for rays through the surface.
     pub(super) sides: Sides,
-    /// The body has been cut open: no samples are on the walls of the cut, and the mesh's surface does not know them.
-    has_lips: bool,
     #[held(skip)]
     isa: Isa,
 }
@@ -37,9 +35,7 @@ impl Surface {
     pub fn new(samples: Arc<Samples>, mesh: Arc<Mesh>, isa: Isa) -> Result<Surface> {
         Ok(Surface {
             search: memory::tried(Search::with_room(&samples), WHAT)?,
-            sides: Sides::new(mesh.node_count())?,
-            has_lips: (mesh.domain_nodes.iter())
-                .any(|node| mesh.surface_nodes.binary_search(node).is_err()),
+            sides: Sides::of(&mesh)?,
             samples,
             mesh,
             isa,
@@ -48,17 +44,16 @@ impl Surface {
 
     /// Where a tool in the tissue comes out; none where it does not lie in it.
     pub(super) fn buried(&mut self, body: &Body, pose: &Pose, state: State<'_>) -> Option<Buried> {
-        let samples = (&*self.samples, self.has_lips);
         let solid = Solid::of(&self.mesh, state, &mut self.sides);
-        Buried::find((body, pose), samples, solid, self.isa)
+        Buried::find((body, pose), &self.samples, solid, self.isa)
     }
 
     /// Where the tip of a thin tool has pierced the surface.
     pub(super) fn tip(&mut self, body: &Body, pose: &Pose, state: State<'_>) -> Option<Buried> {
-        let (samples, has_lips) = (&self.samples, self.has_lips);
+        let samples = &self.samples;
         let mut solid = Solid::of(&self.mesh, state, &mut self.sides);
         Buried::tip((body, pose), samples, state, self.isa, |point| {
-            !has_lips && solid.is_inside(point)
+            solid.is_inside(point)
         })
     }
 
