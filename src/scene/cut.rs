@@ -18,10 +18,12 @@ use super::cut_state::CutState;
 use super::maker::StepMaker;
 use super::published::{BodyNumber, CutModel, Frame, Published};
 use super::published::{SCENE, lock_read, lock_write};
+use crate::contact::ContactReport;
 use crate::error::{Error, Result};
 use crate::haptics::publish::tissue::HandTissue;
 use crate::memory::{self, HeldBytes};
 use crate::model::Model;
+use crate::stats::SceneStats;
 
 impl Published {
     /// What a core shows at rest, without region and points.
@@ -96,6 +98,9 @@ impl Core {
                 spread(&from.field, &mut to.field, source);
             }
         }
+        // What the last step did and told stays, until the next one.
+        let (stats, mut told) = (lock_read(published).stats, ContactReport::default());
+        told.take(&lock_read(published).tools)?;
         next.maker.follow(&self.maker, source)?;
         next.maker.loads.push(&next.maker.body, &change.pushes)?;
         let before = lock_read(published).body;
@@ -108,6 +113,12 @@ impl Core {
         let hands = std::mem::take(&mut next.hands);
         self.replace(published, next, shown);
         self.hands = hands;
+        let mut shown = lock_write(published);
+        shown.tools = told;
+        shown.stats = SceneStats {
+            memory_bytes: shown.stats.memory_bytes,
+            ..stats
+        };
         Ok(change)
     }
 

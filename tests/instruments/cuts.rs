@@ -47,7 +47,11 @@ fn nothing_moves_at_the_moment_of_a_cut() {
     let tools = std::slice::from_ref(&tool);
     let before = step(&scene, tools);
     let count = scene.node_count();
+    let told = (readings(&scene)[0].force, scene.stats().flags);
     let cut = scene.cut(0, 2, &slit(&scene, 6.0, 15.0)).unwrap();
+    // What the last step told stays until the next one.
+    assert_eq!(told, (readings(&scene)[0].force, scene.stats().flags));
+    assert!(size(told.0) > 10.0, "{told:?}");
     assert!(!cut.copied.is_empty() && cut.area_mm2 > 100.0 && cut.removed_mm3.abs() < 1e-3);
     assert_eq!(scene.node_count(), count + cut.copied.len());
     let mut now = vec![0.0; 3 * scene.node_count()];

@@ -182,6 +182,19 @@ impl ContactReport {
         memory::fit(&mut self.pushes, pushes, WHAT)
     }
 
+    /// Takes what another holds.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn take(&mut self, other: &ContactReport) -> Result<()> {
+        self.fit(other.readings.len(), other.ties.len(), other.pushes.len())?;
+        self.clear();
+        self.readings.extend_from_slice(&other.readings);
+        self.ties.extend_from_slice(&other.ties);
+        self.pushes.extend_from_slice(&other.pushes);
+        Ok(())
+    }
+
     /// No tools and no ties.
     pub fn clear(&mut self) {
         self.readings.clear();
