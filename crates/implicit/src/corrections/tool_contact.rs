@@ -148,6 +148,7 @@ impl ToolStep<'_> {
         let is_sunk = left > SUNK_MM && is_sound(size, at.det);
         if is_sunk && !has_begun_again && self.may_begin_again() {
             // The guess has lost it: tissue that swings goes on past a small tool.
+            self.problem.work.attempt(false);
             self.begin_again(at)?;
             if self.problem.ways.longest() > LEAST_WAY_MM {
                 // The whole way may lose them again.

@@ -25,6 +25,7 @@ impl ToolStep<'_> {
     /// unbalanced near the tools. With tools alone a last state with inverted elements, or work that is spent, leaves the guess.
     pub(super) fn recover(&mut self, at: &mut Iterate<'_>) -> Result<f64> {
         let was_sound = self.solver.motion.min_det >= SMALLEST_DET && !self.input.still;
+        self.problem.work.attempt(false);
         if self.must_be_sound() {
             self.problem.work.renew();
         } else if !was_sound || self.problem.work.is_spent() {

@@ -34,7 +34,9 @@ pub(in crate::corrections) fn make_loaded(
     if step.must_be_sound() {
         step.problem.work.unbound();
     }
+    step.problem.work.attempt(true);
     step.balance_loaded(next, from_published, true)?;
+    step.problem.work.attempt(false);
     // Tools that no single step follows stop on their way, at last where they were; beside one that was put elsewhere they do so at once, and where a budget of
     // time is over.
     let at_once = step.problem.ways.has_leapt || step.problem.work.is_late();
