@@ -20,8 +20,9 @@ SYMBOL = struct.Struct("<IBBHQQ")
 #: Of the C library too, though Rust declares them elsewhere.
 MATHS = set(
     """
-    acos acosf asin asinf atan atan2 atan2f atanf cbrt ceil cos cosh exp exp2 exp2f expf expm1 floor fma fmaf fmod fmodf hypot hypotf
-    ldexp log log10 log1p log2 logf pow powf rint round sin sincos sincosf sinf cosf sinh sqrt tan tanh tgamma trunc
+    acos acosf asin asinf atan atan2 atan2f atanf cbrt ceil cos cosh exp exp2 exp2f expf expm1 floor fma fmaf
+    fmod fmodf hypot hypotf ldexp log log10 log1p log2 logf pow powf rint round
+    sin sincos sincosf sinf cosf sinh sqrt tan tanh tgamma trunc
     """.split()
 )
 COMPILERS = set("memcpy memmove memset memcmp bcmp strlen __errno __cxa_finalize __register_atfork".split())
