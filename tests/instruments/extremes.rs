@@ -242,3 +242,23 @@ fn a_bundle_without_a_linear_response_says_what_to_use_instead() {
             .contains("upt_scene_contacts_from_instruments")
     );
 }
+
+/// A slow press makes the iterations that the host asks for until none helps, however many nodes are near. (Their work was bounded for a day, and nothing
+/// told.)
+#[test]
+fn a_slow_press_makes_the_iterations_that_are_asked_for() {
+    let options = SceneOptions {
+        corrections: Corrections::Fixed(64),
+        ..SceneOptions::default()
+    };
+    let scene = upt::Scene::new(model(fixture::shipped("brain-reduced")), &options).unwrap();
+    let mut made = 0;
+    for frame in 0..12u8 {
+        let depth = 0.8 * f32::from(frame.min(6));
+        step(&scene, &[pressing(&scene, depth, Vector::ZERO)]);
+        made += scene.stats().corrections;
+        println!("{frame}: {} iterations", scene.stats().corrections);
+    }
+    println!("{made} in all");
+    assert!(made > 600, "{made} iterations");
+}

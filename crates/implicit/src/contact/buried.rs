@@ -96,12 +96,7 @@ fn deepest_by_walls(
     mut is_inside: impl FnMut(Vector) -> bool,
 ) -> Option<Buried> {
     let mut deepest: Option<Buried> = None;
-    let mut last = None;
-    for probe in body.probes() {
-        if last.replace(probe) == Some(probe) {
-            continue;
-        }
-        let point = pose.transform_point(probe);
+    for point in probes(body, pose) {
         let depth = deepest.map_or(least, |buried| buried.depth);
         if let Some(found) = behind(point, samples, state)
             && found.depth > depth
@@ -134,14 +129,30 @@ fn behind(point: Vector, samples: &Samples, state: State<'_>) -> Option<Buried> 
     if is_other || length > LONGEST_MM * LONGEST_MM {
         return None;
     }
-    let i = (v * LATTICE as f32).round() as u32;
-    let j = (w * LATTICE as f32).round() as u32;
+    through(point, out, (samples, face, [v, w]))
+}
+
+/// The way `out` of a point through a face, at the lattice point nearest to weights `v` and `w` of its second and third corner.
+fn through(
+    point: Vector,
+    out: Vector,
+    (samples, face, weights): (&Samples, usize, [f32; 2]),
+) -> Option<Buried> {
+    let [i, j] = weights.map(|weight| (weight * LATTICE as f32).round() as u32);
     Some(Buried {
         out: out.try_normalize()?,
         depth: out.length(),
         row: samples.lattice_row(face, [i, j.min(LATTICE - i)])?,
         point,
     })
+}
+
+/// Where a tool's probes are, each once: those of a ball are all its middle.
+fn probes(body: &Body, pose: &Pose) -> impl Iterator<Item = Vector> {
+    let mut last = None;
+    let is_new = move |probe: &Vector| last.replace(*probe) != Some(*probe);
+    let new = body.probes().filter(is_new);
+    new.map(|probe| pose.transform_point(probe))
 }
 
 /// The deepest of a tool's probes that lie more than `least` mm below the touchable surface. Of one that may lie beside a rim of that surface
@@ -154,11 +165,7 @@ fn deepest(
     mut is_inside: impl FnMut(Vector) -> bool,
 ) -> Option<Buried> {
     let mut deepest: Option<Buried> = None;
-    let mut last = None;
-    // Those of a ball are all its middle.
-    let is_new = |probe: &Vector| last.replace(*probe) != Some(*probe);
-    let probes = body.probes().filter(is_new);
-    let mut probes = probes.map(|probe| pose.transform_point(probe));
+    let mut probes = probes(body, pose);
     loop {
         // By axis, which vectors of the processor take.
         let (mut points, mut count) = ([[0.0f32; AT_ONCE]; 3], 0);
@@ -246,14 +253,7 @@ fn below(
     if out.dot(outward) <= 0.0 || along_normal <= 0.0 {
         return None;
     }
-    let i = (v * LATTICE as f32).round() as u32;
-    let j = (w * LATTICE as f32).round() as u32;
-    let buried = Buried {
-        out: out.try_normalize()?,
-        depth: out.length(),
-        row: samples.lattice_row(face, [i, j.min(LATTICE - i)])?,
-        point,
-    };
+    let buried = through(point, out, (samples, face, [v, w]))?;
     let is_along = along_normal < IN_DOUBT * buried.depth * face_outward.length();
     Some((buried, is_along && is_on_rim(samples, face, weights)))
 }

@@ -79,7 +79,6 @@ impl Work {
 
     /// A step whose guess is of no use begins again.
     pub fn renew(&mut self) {
-        self.is_first = false;
         self.solves = self.solves.max(SOLVES_WORK);
         self.whole = self.whole.max(SOLVES_WORK);
     }
