@@ -168,7 +168,7 @@ class Browser:
     def run(self, script: str) -> object:
         return self._call("POST", f"/session/{self.session}/execute/sync", {"script": script, "args": []})
 
-    def wait(self, condition: str, seconds: float = 60) -> object:
+    def wait(self, condition: str, seconds: float = 240) -> object:
         """The value of a JavaScript expression once it is true."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:

@@ -118,12 +118,22 @@ def a_blade_cuts_and_undo_heals():
         go(lambda done: None, lambda now: now.area == 0 and now.undos == 0)
 
 
+# Pictures whose button of undo says something else than the frame: a click on it does nothing then.
+STALE = """
+uptView.stale = 0;
+(function look() {
+  if (uptView.undos > 0 === document.getElementById("undo").disabled) uptView.stale += 1;
+  requestAnimationFrame(look);
+})()"""
+
+
 def the_mouse_operates(browser: Browser, bundle: Path, pictures: Path) -> None:
     with server(bundle) as (port, token):
         browser.open(f"http://127.0.0.1:{port}/?token={token}")
         browser.wait("window.uptView && uptView.shown > 10")
         x, y = browser.run("return uptView.middle")
         before = browser.run("return uptView.surfaces")
+        browser.run(STALE)
         browser.click("[data-kind=blade]")
         browser.drag([(x - 45, y - 10), (x - 44, y - 10)], release=False)
         browser.move([(x - 44, y - 10)] * 4)
@@ -170,3 +180,4 @@ def the_mouse_operates(browser: Browser, bundle: Path, pictures: Path) -> None:
         browser.release()
         browser.click("#undo")
         browser.wait("uptView.area === 0")
+        assert browser.run("return uptView.stale") == 0

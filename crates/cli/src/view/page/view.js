@@ -139,6 +139,7 @@ function take(data) {
   status.removed = numbers[26];
   status.copies = words[27];
   status.undos = words[28];
+  at("undo").disabled = status.undos === 0; // at once: a stroke is undone as soon as it is seen
   status.changeMs = numbers[29];
   status.height = numbers[30];
   status.ball = numbers[34];
@@ -159,7 +160,6 @@ function readOut() {
   show("contacts", String(status.contacts));
   show("record", status.recording ? "Stop" : "Record");
   if (kind !== "press" || status.undos > 0) at("wound").hidden = false;
-  at("undo").disabled = status.undos === 0;
   show("area", `${(status.area / 100).toFixed(2)} cm²`);
   show("removed", `${(status.removed / 1000).toFixed(2)} cm³`);
   show("copies", String(status.copies));
