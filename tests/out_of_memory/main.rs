@@ -57,6 +57,7 @@ fn stride(call: &str) -> usize {
     if call.contains("cut")
         || call.contains("surface")
         || call.contains("remove")
+        || call.contains("tear")
         || call.contains("scale")
     {
         11
@@ -65,13 +66,19 @@ fn stride(call: &str) -> usize {
     }
 }
 
-/// Of what ships, whose steps are long, a fifth of them; each with `UPT_NIGHTLY=1`.
-fn every(bundle: &Path) -> usize {
+/// The same with a bundle in a run that is not nightly (`UPT_NIGHTLY=1`): of what ships, whose steps are long, a fifth of them, of others a third where
+/// it would be every one.
+fn stride_with(bundle: &Path, call: &str) -> usize {
     let nightly = std::env::var_os("UPT_NIGHTLY").is_some_and(|value| value == "1");
     let ships = bundle
         .parent()
         .is_some_and(|folder| folder.ends_with("onnx"));
-    if ships && !nightly { 5 } else { 1 }
+    match stride(call) {
+        stride if nightly => stride,
+        stride if ships => 5 * stride,
+        1 => 3,
+        stride => stride,
+    }
 }
 
 /// Requests of all calls, refused one at a time. Returns how many were.
@@ -86,7 +93,7 @@ fn starve(bundle: &Path, options: upt_scene_options, calls: &[Call]) -> usize {
     drop(rig);
     let mut all = 0;
     for (index, (name, call)) in calls.iter().enumerate() {
-        let stride = stride(name) * every(bundle);
+        let stride = stride_with(bundle, name);
         for at in (0..).step_by(stride) {
             let what = format!("{name}, request {at}");
             let mut rig = Rig::new(bundle, options);

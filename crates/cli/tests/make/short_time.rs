@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use super::{HELD, command, plain, text, works};
 
 /// `upt make` of the small organ without --cases, with so many minutes.
-fn made(surface: &Path, out: &Path, minutes: &str, more: &[&str]) -> Output {
+pub fn made(surface: &Path, out: &Path, minutes: &str, more: &[&str]) -> Output {
     let whole = command(surface, out, &HELD);
     let arguments: Vec<_> = whole.get_args().collect();
     let at = arguments
@@ -30,7 +30,7 @@ fn certificate(out: &Path) -> serde_json::Value {
 }
 
 /// What makes every bundle of this organ is in the work folder: a run of that is killed, or whole.
-fn begun(surface: &Path, out: &Path) {
+pub fn begun(surface: &Path, out: &Path) {
     let mut child = command(surface, out, &HELD).spawn().unwrap();
     let record = out.with_extension("work").join("tables.stage.json");
     while !record.exists() && child.try_wait().unwrap().is_none() {

@@ -29,7 +29,9 @@ fn a_reduced_bundle_survives_every_extreme_case() {
     );
 }
 
+/// A network's steps take ten times as long. That its steps stay bounded, every run sees in `tests/comes_to_rest.rs`.
 #[test]
+#[ignore = "skipped: nightly, the suite on a bundle with a network"]
 fn a_transformer_survives_every_extreme_case() {
     ends_as_it_must(&["--no-reference", "--bundle", "onnx/brain-coarse"], 40);
 }
