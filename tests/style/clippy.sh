@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# cargo clippy of the workspace, and of builds with a single feature or none, each of which must compile, tests included.
+# cargo clippy of the workspace, of a build without features, for WebAssembly and for Windows, and nightly of builds with a single feature.
 # Warnings are errors. The last line: N passed, N failed, N skipped.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.." || exit 1
@@ -17,16 +17,28 @@ alone() {
 
 lint --workspace
 alone "libupt tissue" ""
-alone "libupt tissue" libupt/instruments
-alone "libupt tissue" libupt/learned,tissue/linear
-alone tissue files
-alone "upt-cli upt-study" "" # the demo's
-if compgen -G "$(rustc --print target-libdir --target wasm32-unknown-unknown)/libstd-*" >/dev/null; then
-  check "clippy for WebAssembly" cargo clippy --release --package libupt --lib --target wasm32-unknown-unknown --no-default-features \
-    --features instruments -- -D warnings
+if [ "${UPT_NIGHTLY:-0}" = 1 ]; then
+  alone "libupt tissue" libupt/instruments
+  alone "libupt tissue" libupt/learned,tissue/linear
+  alone tissue files
+  alone "upt-cli upt-study" "" # the demo's
 else
-  leave_out 1 "clippy for WebAssembly: rustup target add wasm32-unknown-unknown"
+  leave_out 4 "builds with a single feature: nightly; here is one with none, and those of WebAssembly and Windows have some"
 fi
+
+# other TRIPLE NAME WORDS...: for another platform, where its standard library is.
+other() {
+  local triple="$1" name="$2"
+  shift 2
+  if compgen -G "$(rustc --print target-libdir --target "$triple")/libstd-*" >/dev/null; then
+    check "clippy for $name" cargo clippy --release --target "$triple" --no-default-features "$@" -- -D warnings
+  else
+    leave_out 1 "clippy for $name: rustup target add $triple"
+  fi
+}
+other wasm32-unknown-unknown WebAssembly --package libupt --lib --features instruments
+# What is built for Windows, and run there by Wine, in the nightly stage of that name.
+other x86_64-pc-windows-gnu Windows --package libupt --package upt-cli
 
 echo "$passed passed, $failed failed, $skipped skipped"
 [ "$failed" -eq 0 ]
