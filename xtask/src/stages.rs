@@ -35,37 +35,41 @@ const fn stage(name: &'static str, about: &'static str, needs: Needs, run: Run) 
     }
 }
 
+/// Rust's tests, with the features of a release, so that what [`Workspace::build`] wants later is built already.
+const TESTS: &str = "test --release --workspace --exclude upt-bindgen";
+
 /// No leak, no force that is no number or that stays; the log says how many hours fitted.
 const HAPTICS: &str =
     "run --release --package upt-study -- haptics onnx/brain-coarse-reduced --hours 24 --within 20";
 
 /// In this order: what is cheap and most often wrong comes first. Groups run one after another, the lanes of a group at the same
-/// time, the stages of a lane one after another. No stage runs beside `rust`, whose build replaces the programs that others use.
+/// time, the stages of a lane one after another. No stage runs beside `build`, which replaces the programs that others use. A lane
+/// waits now and then for one core, so that two of them keep two cores busy.
 #[rustfmt::skip]
 pub const STAGES: &[&[&[Stage]]] = &[
     &[&[
         stage("fmt", "cargo fmt --check", "", Cargo("fmt --all --check")),
-        stage("clippy", "cargo clippy, warnings are errors; also of builds with a single feature or none", "", Function(clippy)),
+        stage("clippy", "cargo clippy, warnings are errors; also without features, for WebAssembly and for Windows", "", Function(clippy)),
         stage("rustdoc", "cargo doc of the libraries, warnings are errors", "", Function(rustdoc)),
         stage("style", "ruff, clang-format, dependencies, licences, circles and upward imports, sizes of files", "", Function(style)),
         stage("abi", "bindings are fresh, and the last release's C ABI stands", "", Function(abi)),
-        stage("rust", "cargo test --release --workspace", "", Function(rust)),
+        stage("build", "cargo test --release --workspace --no-run", "", Function(build)),
     ]],
     &[
         &[
+            stage("rust", "cargo test --release --workspace", "", Function(rust)),
+            stage("view", "upt view in headless Chromium", system::BROWSER, Script("tests/view/run.sh")),
             stage("loom", "every interleaving of what threads share without a lock", "", Script("tests/races/run.sh loom")),
             stage("wheel", "the Python package: wheel, types, pytest", "", Function(wheel::stage)),
             stage("docs", "the book: links, code blocks, commands, index", "", Function(docs)),
-            stage("c", "C and C++ hosts, CMake package, simulator", system::NATIVE, Script("tests/c/run.sh")),
-            stage("csharp", "the Unity package's C# under Mono", system::CSHARP, Script("tests/csharp/run.sh")),
-            stage("godot", "the GDExtension in a real engine", system::NATIVE, Script("examples/godot/run.sh")),
-            stage("package", "the archive, unpacked elsewhere", system::PACKAGE, Function(package)),
-            stage("view", "upt view in headless Chromium", system::BROWSER, Script("tests/view/run.sh")),
         ],
         &[
             stage("python", "pytest of training/", "", Function(python)),
             stage("web", "WebAssembly in Node, the site in headless Chromium", system::WEB, Function(web::stage)),
-            stage("windows", "built by MinGW, run by Wine", system::WINDOWS, Function(cross::windows)),
+            stage("c", "C and C++ hosts, CMake package, simulator", system::NATIVE, Script("tests/c/run.sh")),
+            stage("package", "the archive, unpacked elsewhere", system::PACKAGE, Function(package)),
+            stage("csharp", "the Unity package's C# under Mono", system::CSHARP, Script("tests/csharp/run.sh")),
+            stage("godot", "the GDExtension in a real engine", system::NATIVE, Script("examples/godot/run.sh")),
         ],
     ],
 ];
@@ -75,6 +79,7 @@ pub const STAGES: &[&[&[Stage]]] = &[
 pub const NIGHTLY: &[&[&[Stage]]] = &[&[&[
     stage("haptics", "a day of simulated haptics, or what fits into 20 minutes", system::NATIVE, Cargo(HAPTICS)),
     stage("races", "what threads share: Miri, ThreadSanitizer", "", Script("tests/races/run.sh nightly")),
+    stage("windows", "built by MinGW, run by Wine; every run compiles for it in the stage clippy", system::WINDOWS, Function(cross::windows)),
     stage("arm64", "Linux arm64, run by qemu", system::ARM64, Function(cross::arm64)),
     stage("linked", "macOS, MSVC and Android: linked, the files read, MSVC's run by Wine", system::WINDOWS, Function(cross::linked_stage)),
 ]]];
@@ -120,10 +125,19 @@ fn abi(workspace: &Workspace) -> Result<Outcome> {
     counted(workspace, "cargo test", &mut command, counts::cargo)
 }
 
-/// With the features of a release, so that what [`Workspace::build`] wants later is built already.
+/// What all later stages run, and ONNX Runtime.
+fn build(workspace: &Workspace) -> Result<Outcome> {
+    let mut command = workspace.cargo(&format!("{TESTS} --no-run"));
+    ort::set_environment(workspace, &mut command)?;
+    check(workspace, "cargo test --no-run", &mut command)
+}
+
 fn rust(workspace: &Workspace) -> Result<Outcome> {
-    let words = "test --release --workspace --exclude upt-bindgen --no-fail-fast";
-    let mut command = workspace.cargo(words);
+    let mut command = workspace.cargo(&format!("{TESTS} --no-fail-fast"));
+    if workspace.is_nightly() {
+        // A test that is too long for every run is ignored, and says so.
+        command.args(["--", "--include-ignored"]);
+    }
     ort::set_environment(workspace, &mut command)?;
     command.env("CARGO_TERM_COLOR", "never");
     counted(workspace, "cargo test", &mut command, counts::cargo)
@@ -132,7 +146,7 @@ fn rust(workspace: &Workspace) -> Result<Outcome> {
 /// Python tests compare with the Rust side through its commands.
 fn python(workspace: &Workspace) -> Result<Outcome> {
     venv::install(workspace, venv::TRAINING)?;
-    in_python(workspace, "-m pytest -q -p no:cacheprovider training")
+    in_python(workspace, "-m pytest -q -rs -p no:cacheprovider training")
 }
 
 fn docs(workspace: &Workspace) -> Result<Outcome> {

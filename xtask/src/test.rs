@@ -51,7 +51,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     }
     let is_set = |name: &str| std::env::var(name).is_ok_and(|value| value == "1");
     let strict = options.strict || is_set("UPT_STRICT");
-    let (only, nightly) = (&options.only, is_set("UPT_NIGHTLY"));
+    let (only, nightly) = (&options.only, workspace.is_nightly());
     let asked = |stage: &&Stage| match only.is_empty() {
         true => nightly || !all(NIGHTLY).any(|left_out| left_out.name == stage.name),
         false => only.iter().any(|name| name == stage.name),

@@ -52,17 +52,18 @@ const ORGANS: [Organ; 3] = [
     },
 ];
 
-/// The module with the library's features. Rust's standard library for it comes by rustup, where it is missing.
+/// The module with the library's features, by a profile of `Cargo.toml`: `web` is what is shipped. Rust's standard library for it comes by rustup,
+/// where it is missing.
 ///
 /// # Errors
 /// Where it cannot be had, or something does not compile.
-fn module(workspace: &Workspace, features: &str) -> Result<PathBuf> {
+fn module(workspace: &Workspace, profile: &str, features: &str) -> Result<PathBuf> {
     ensure!(
         has_target(workspace),
         "Rust's standard library for {TARGET} is missing: rustup target add {TARGET}"
     );
     let words = format!(
-        "rustc --profile web --lib --crate-type cdylib --target {TARGET} -p libupt --no-default-features --features {features}"
+        "rustc --profile {profile} --lib --crate-type cdylib --target {TARGET} -p libupt --no-default-features --features {features}"
     );
     run_checked(
         workspace,
@@ -70,7 +71,7 @@ fn module(workspace: &Workspace, features: &str) -> Result<PathBuf> {
         &mut workspace.cargo(&words),
     )?;
     let target = workspace.release.with_file_name("");
-    let made = target.join(TARGET).join("web/upt.wasm");
+    let made = target.join(TARGET).join(profile).join("upt.wasm");
     let bare = made.with_file_name("upt.bare.wasm");
     let bytes = std::fs::read(&made).with_context(|| made.display().to_string())?;
     std::fs::write(
@@ -110,7 +111,7 @@ fn has_target(workspace: &Workspace) -> bool {
 /// The npm package.
 pub fn package(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     let root = out.join("web/package");
-    unpacked(workspace, &module(workspace, "instruments")?, &root)?;
+    unpacked(workspace, &module(workspace, "web", "instruments")?, &root)?;
     let words = "tests/style/licences.py --write";
     let mut licences = workspace.python(words);
     run_checked(workspace, words, licences.arg(root.join("THIRD-PARTY.txt")))?;
@@ -144,7 +145,7 @@ fn modules(workspace: &Workspace, wasm: &Path, to: &Path) -> Result<()> {
 /// `cargo xtask site`.
 pub fn site(workspace: &Workspace, out: &Path) -> Result<bool> {
     let out = workspace.root.join(out);
-    let wasm = module(workspace, "instruments")?;
+    let wasm = module(workspace, "web", "instruments")?;
     make_bundles(workspace)?;
     write_site(workspace, &wasm, &ORGANS, &out)?;
     venv::install(workspace, venv::DOCS)?;
@@ -253,8 +254,14 @@ pub fn stage(workspace: &Workspace) -> Result<Outcome> {
             "needs rustup target add {TARGET}"
         )));
     }
+    // Optimising the module as a whole is half of its build, and changes no bit of what it computes. What its build runs, such as macros, is there from
+    // the stage `build` in one of them.
+    let profile = match workspace.is_nightly() {
+        true => "web",
+        false => "release",
+    };
     // With the call that panics.
-    let wasm = module(workspace, "instruments,fault")?;
+    let wasm = module(workspace, profile, "instruments,fault")?;
     let site = workspace.path("target/web/site");
     write_site(workspace, &wasm, &ORGANS[..1], &site)?;
     let npm = workspace.path("target/web/npm");

@@ -27,6 +27,11 @@ impl Workspace {
         }
     }
 
+    /// Whether tests run in full, as `.ci/run nightly` asks.
+    pub fn is_nightly(&self) -> bool {
+        std::env::var("UPT_NIGHTLY").is_ok_and(|value| value == "1")
+    }
+
     pub fn path(&self, relative: &str) -> PathBuf {
         self.root.join(relative)
     }
