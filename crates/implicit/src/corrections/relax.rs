@@ -3,6 +3,7 @@
 
 use crate::clock::Instant;
 
+use super::estimate::EXCUSED;
 use super::fields::Fields;
 use super::input::{Input, Report, SolverContext};
 use super::line_search::{LineSearch, SHORTENINGS, Tried};
@@ -43,11 +44,12 @@ impl FieldStep<'_> {
             self.report.iterations += 1;
             // What a further iteration would move is told from what this one has moved and how far it has brought the residual down.
             self.report.remaining_mm = self.remaining(env, g, size)?;
-            if self
-                .solver
-                .motion
-                .suffices(iteration + 1, self.report.remaining_mm, input.enough)
-            {
+            if self.solver.motion.suffices(
+                iteration + 1,
+                self.report.remaining_mm,
+                input.enough,
+                EXCUSED,
+            ) {
                 break;
             }
         }

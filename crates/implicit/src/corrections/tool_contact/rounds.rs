@@ -3,6 +3,7 @@
 use super::{Iterate, ToolStep, is_sound, is_spent, over_kept};
 use crate::contact::ContactProblem;
 
+use crate::corrections::estimate::{EXCUSED, EXCUSED_IN_CUT};
 use crate::corrections::local::{Base, LocalSolver, StepContext};
 use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
@@ -121,10 +122,15 @@ impl ToolStep<'_> {
                     .map_or(0.0, |local| local.measured.moved_mm),
             );
             self.report.remaining_mm = (moved * made.size / before.max(f64::MIN_POSITIVE)) as f32;
+            let excused = match self.context.corrections.changed.is_empty() {
+                true => EXCUSED,
+                false => EXCUSED_IN_CUT,
+            };
             if self.solver.motion.suffices(
                 made.iterations,
                 self.report.remaining_mm,
                 self.input.enough,
+                excused,
             ) {
                 return Ok(());
             }
