@@ -63,3 +63,24 @@ impl Motion {
                 || (rest >= wanted && remaining_mm < 0.1 * rest))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An intact body is let off for what the last step left; one that has been cut goes on until little is left beside that.
+    #[test]
+    fn a_pressed_cut_body_is_let_off_less() {
+        let enough = Enough {
+            iterations: 10,
+            error_mm: 0.02,
+            until: None,
+        };
+        let mut last = Motion::at_rest(3).unwrap();
+        last.error_mm = 0.3;
+        let ends = |left, excused| last.suffices(LEAST, left, enough, excused);
+        assert!(ends(0.01, EXCUSED) && !ends(0.01, EXCUSED_IN_CUT));
+        assert!(ends(0.003, EXCUSED_IN_CUT));
+        assert!(!last.suffices(LEAST - 1, 0.003, enough, EXCUSED_IN_CUT));
+    }
+}
