@@ -25,19 +25,32 @@ pub(super) struct ColumnCompliance {
     /// By column: whether it was there in the call before, and its place then or [`NONE`].
     is_known: Vec<bool>,
     places_before: Vec<u32>,
-    /// Scratch of what is read.
-    upper: Vec<f64>,
-    widened: Vec<f32>,
-    /// All natural modes at the columns, by mode `[n,3m]`.
-    modes: Vec<f32>,
+    scratch: Scratch,
     /// `A [3m,3m]`, mm/mN.
     a: Vec<f32>,
     /// `A` of the call before, over the columns that `wanted` holds afterwards: what both have is copied from here.
     a_before: Vec<f32>,
-    /// `a` is the static compliance: nothing was taken off it for inertia.
+    /// Which compliance `a` is of.
+    kind: Kind,
+}
+
+/// Columns of one kind have nothing to do with those of another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, HeldBytes)]
+struct Kind {
+    /// The static compliance: nothing was taken off it for inertia.
     is_static: bool,
     /// Of which tissue: 0 as it is at rest ([`Tangent::generation`]).
     generation: u64,
+}
+
+/// What columns are made in.
+#[derive(Debug, Default, HeldBytes)]
+struct Scratch {
+    /// What is read of deformed tissue, and of the bundle's tables.
+    upper: Vec<f64>,
+    widened: Vec<f32>,
+    /// All natural modes at the columns, by mode `[n,3m]`.
+    modes: Vec<f32>,
 }
 
 impl ColumnCompliance {
@@ -79,9 +92,11 @@ impl ColumnCompliance {
         // A contact with many columns is broad: there the tissue at rest is near enough, and each column costs solves.
         let few = |_: &&dyn Tangent| self.wanted.len() <= MOST_DEFORMED;
         let tangent = compliance.tangent.filter(few);
-        let generation = tangent.map_or(0, |tangent| tangent.generation());
-        let same_kind =
-            self.is_static == compliance.inertia.is_none() && self.generation == generation;
+        let kind = Kind {
+            is_static: compliance.inertia.is_none(),
+            generation: tangent.map_or(0, |tangent| tangent.generation()),
+        };
+        let same_kind = self.kind == kind;
         if same_kind
             && !self.columns.is_empty()
             // Columns that nobody wants any more go once they are half of all.
@@ -93,8 +108,7 @@ impl ColumnCompliance {
         if !same_kind {
             self.columns.clear();
         }
-        self.is_static = compliance.inertia.is_none();
-        self.generation = generation;
+        self.kind = kind;
         std::mem::swap(&mut self.columns, &mut self.wanted);
         std::mem::swap(&mut self.a, &mut self.a_before);
         // `wanted` and `a_before` hold the call before while `a` is made.
@@ -111,10 +125,14 @@ impl ColumnCompliance {
         let order = 3 * count;
         let modes = compliance.inertia.map_or(0, |(_, lost)| lost.len());
         memory::fit(&mut self.a, order * order, WHAT)?;
-        memory::fit(&mut self.modes, modes * order, WHAT)?;
+        memory::fit(&mut self.scratch.modes, modes * order, WHAT)?;
         memory::fit(&mut self.is_known, count, WHAT)?;
         memory::fit(&mut self.places_before, count, WHAT)?;
-        memory::fit(&mut self.widened, 6 * compliance.prior.widest_block(), WHAT)?;
+        memory::fit(
+            &mut self.scratch.widened,
+            6 * compliance.prior.widest_block(),
+            WHAT,
+        )?;
         // All that is there is written over.
         self.a.resize(order * order, 0.0);
         let (columns, before) = (&self.columns, &self.wanted);
@@ -127,18 +145,18 @@ impl ColumnCompliance {
         if let Some(tangent) = tangent {
             // The response keeps its own columns; here all of them are read from it.
             self.is_known.fill(false);
-            self.upper.clear();
-            memory::fit(&mut self.upper, order * order, WHAT)?;
-            self.upper.resize(order * order, 0.0);
-            tangent.gather(&self.columns, &mut self.upper)?;
-            let values = self.a.iter_mut().zip(&self.upper);
+            self.scratch.upper.clear();
+            memory::fit(&mut self.scratch.upper, order * order, WHAT)?;
+            self.scratch.upper.resize(order * order, 0.0);
+            tangent.gather(&self.columns, &mut self.scratch.upper)?;
+            let values = self.a.iter_mut().zip(&self.scratch.upper);
             values.for_each(|(a, value)| *a = *value as f32);
         } else {
             self.take_known(order);
             compliance.prior.gather_new_compliance(
                 (&self.columns, &self.is_known),
                 &mut self.a,
-                &mut self.widened,
+                &mut self.scratch.widened,
             );
             if let Some((space, inertial_compliance)) = compliance.inertia {
                 self.hold_back(space, inertial_compliance, order);
@@ -182,12 +200,14 @@ impl ColumnCompliance {
     /// Takes the natural modes' part off the upper triangle, where it is not known from before.
     fn hold_back(&mut self, space: &CoarseSpace, inertial_compliance: &[f32], order: usize) {
         let dof = |at: usize| 3 * self.columns[at / 3] as usize + at % 3;
-        self.modes.clear();
-        self.modes.resize(inertial_compliance.len() * order, 0.0);
+        self.scratch.modes.clear();
+        self.scratch
+            .modes
+            .resize(inertial_compliance.len() * order, 0.0);
         for at in 0..order {
             let own = space.at_contact(dof(at));
             for (mode, value) in own.iter().take(inertial_compliance.len()).enumerate() {
-                self.modes[mode * order + at] = *value;
+                self.scratch.modes[mode * order + at] = *value;
             }
         }
         let is_known = &self.is_known;
@@ -204,7 +224,7 @@ impl ColumnCompliance {
                 }
                 if !is_known {
                     for (mode, lost) in inertial_compliance.iter().enumerate() {
-                        let values = &self.modes[mode * order..(mode + 1) * order];
+                        let values = &self.scratch.modes[mode * order..(mode + 1) * order];
                         let factor = lost * values[at];
                         for (a, value) in row[start..end].iter_mut().zip(&values[start..end]) {
                             *a -= factor * value;
