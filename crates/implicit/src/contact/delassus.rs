@@ -21,12 +21,9 @@ struct Entries {
 pub struct Delassus {
     /// `A` at the columns that the samples touch.
     at: ColumnCompliance,
-    /// `W = B A B^T [3n,3n]`, mm/mN, and the samples whose rows `B` it is made of.
-    w: Vec<f32>,
-    of: Vec<u32>,
-    /// `W` and its samples in the call before.
-    w_before: Vec<f32>,
-    of_before: Vec<u32>,
+    /// Of the last call, and of the call before, from which what both have is copied.
+    now: Matrix,
+    before: Matrix,
     /// Samples of the call before, ascending, and their rows there; by sample, its row there or [`NONE`].
     known: Vec<(u32, u32)>,
     was: Vec<u32>,
@@ -38,6 +35,20 @@ pub struct Delassus {
     order: Vec<u32>,
     /// Of which ties.
     ties: u64,
+}
+
+/// `W = B A B^T [3n,3n]`, mm/mN, and the samples whose rows `B` it is made of.
+#[derive(Debug, Default, HeldBytes)]
+struct Matrix {
+    values: Vec<f32>,
+    samples: Vec<u32>,
+}
+
+impl Matrix {
+    fn clear(&mut self) {
+        self.values.clear();
+        self.samples.clear();
+    }
 }
 
 /// `B A` of one sample `[3,3m]`, and its block at each column `[m]`, row-major.
@@ -64,7 +75,7 @@ impl Delassus {
         rows: &[u32],
     ) -> Result<&[f32]> {
         self.read(compliance, all.into(), rows)?;
-        Ok(&self.w)
+        Ok(&self.now.values)
     }
 
     /// The same, and whether it is other than that of the last call.
@@ -78,66 +89,73 @@ impl Delassus {
         rows: &[u32],
     ) -> Result<(&[f32], bool)> {
         let is_new = self.read(compliance, all, rows)?;
-        Ok((&self.w, is_new))
+        Ok((&self.now.values, is_new))
     }
 
     /// Samples of the last call.
     pub fn rows(&self) -> &[u32] {
-        &self.of
+        &self.now.samples
     }
 
     /// `f^T W f` under forces on them, mN mm.
     pub fn work(&self, force: impl Fn(u32) -> Vector) -> f32 {
-        let blocks = self.w.chunks_exact(3 * self.of.len().max(1));
-        let on = self.of.iter().flat_map(|row| force(*row).to_array());
+        let blocks = self
+            .now
+            .values
+            .chunks_exact(3 * self.now.samples.len().max(1));
+        let on = self
+            .now
+            .samples
+            .iter()
+            .flat_map(|row| force(*row).to_array());
         let moved = |line: &[f32]| -> f32 {
-            let all = self.of.iter().flat_map(|row| force(*row).to_array());
+            let all = self
+                .now
+                .samples
+                .iter()
+                .flat_map(|row| force(*row).to_array());
             line.iter().zip(all).map(|(w, f)| w * f).sum()
         };
         blocks.zip(on).map(|(line, f)| f * moved(line)).sum()
     }
 
-    /// Makes `w` that of the samples; says whether it was another's.
+    /// Makes `W` that of the samples; says whether it was another's.
     fn read(&mut self, compliance: Compliance<'_>, all: Points<'_>, rows: &[u32]) -> Result<bool> {
         if self.ties != all.generation {
             // Rows of the same numbers are others.
-            self.of.clear();
-            self.w.clear();
+            self.now.clear();
             self.ties = all.generation;
         }
         let samples = rows.iter().map(|row| all.at(*row));
         let is_other = self.at.gather(compliance, rows.len(), samples.clone());
         // Blocks of another tissue or length of step are of no use, nor are those of a call that failed half way.
         if !matches!(is_other, Ok(false)) {
-            self.of.clear();
-            self.w.clear();
+            self.now.clear();
         }
         is_other?;
-        if self.of == rows {
+        if self.now.samples == rows {
             return Ok(false);
         }
         let count = rows.len();
         // What both calls have is copied from the one before.
-        std::mem::swap(&mut self.w, &mut self.w_before);
-        std::mem::swap(&mut self.of, &mut self.of_before);
-        self.of.clear();
-        self.w.clear();
+        std::mem::swap(&mut self.now, &mut self.before);
+        self.now.clear();
         self.known.clear();
         self.entries.clear();
-        memory::fit(&mut self.known, self.of_before.len(), WHAT)?;
+        memory::fit(&mut self.known, self.before.samples.len(), WHAT)?;
         memory::fit(&mut self.entries, count, WHAT)?;
-        memory::fit(&mut self.of, count, WHAT)?;
-        memory::fit(&mut self.w, 9 * count * count, WHAT)?;
+        memory::fit(&mut self.now.samples, count, WHAT)?;
+        memory::fit(&mut self.now.values, 9 * count * count, WHAT)?;
         memory::fit(&mut self.order, count, WHAT)?;
         memory::fit(&mut self.was, count, WHAT)?;
         memory::fit(&mut self.line.rows, 3 * self.at.order(), WHAT)?;
         memory::fit(&mut self.line.blocks, self.at.order() / 3, WHAT)?;
-        let before = self.of_before.iter().enumerate();
+        let before = self.before.samples.iter().enumerate();
         self.known
             .extend(before.map(|(at, &sample)| (sample, at as u32)));
         self.known.sort_unstable();
-        self.w.resize(9 * count * count, 0.0);
-        self.of.extend_from_slice(rows);
+        self.now.values.resize(9 * count * count, 0.0);
+        self.now.samples.extend_from_slice(rows);
         for sample in samples {
             let mut entries = Entries::default();
             for (column, weight) in compliance.entries(sample) {
@@ -165,8 +183,8 @@ impl Delassus {
     /// Blocks of `W` of the sample at `first` in the order of their numbers with itself and those after it: each is summed from the lower one of
     /// two samples, so that it does not depend on the order of the rows.
     fn fill_rows(&mut self, first: usize) {
-        let count = self.of.len();
-        let (size, size_before) = (3 * count, 3 * self.of_before.len());
+        let count = self.now.samples.len();
+        let (size, size_before) = (3 * count, 3 * self.before.samples.len());
         let i = self.order[first] as usize;
         let was_i = self.was[i] as usize;
         self.line.rows.clear();
@@ -177,7 +195,7 @@ impl Delassus {
             if self.was[i] != NONE && self.was[j] != NONE {
                 for (axis, row) in block.chunks_exact_mut(3).take(3).enumerate() {
                     let from = (3 * was_i + axis) * size_before + 3 * was_j;
-                    row.copy_from_slice(&self.w_before[from..from + 3]);
+                    row.copy_from_slice(&self.before.values[from..from + 3]);
                 }
             } else {
                 self.add_block(i, j, &mut block);
@@ -190,9 +208,9 @@ impl Delassus {
                 block[1][2] = block[2][1];
             }
             for (axis, values) in block.iter().enumerate() {
-                self.w[(3 * i + axis) * size + 3 * j..][..3].copy_from_slice(values);
+                self.now.values[(3 * i + axis) * size + 3 * j..][..3].copy_from_slice(values);
                 let turned = block.map(|row| row[axis]);
-                self.w[(3 * j + axis) * size + 3 * i..][..3].copy_from_slice(&turned);
+                self.now.values[(3 * j + axis) * size + 3 * i..][..3].copy_from_slice(&turned);
             }
         }
     }
