@@ -278,8 +278,8 @@ impl Corrector {
 
     /// Puts what the iterations report into the statistics.
     pub(super) fn report_to(&self, report: &Report, stats: &mut SceneStats) {
-        stats.corrections = report.iterations;
-        stats.evaluations = report.evaluations;
+        stats.corrections = report.effort.iterations;
+        stats.evaluations = report.effort.evaluations;
         stats.substeps = report.substeps;
         stats.residual = report.residual;
         stats.min_det = report.min_det;

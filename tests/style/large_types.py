@@ -39,7 +39,6 @@ LARGER: dict[str, tuple[int, int]] = {
     "bundle::Mesh": (15, 12),
     "implicit::FarField": (13, 11),
     "implicit::NearSet": (19, 17),
-    "implicit::Report": (11, 1),
     "kernels::DecoderTokens": (11, 8),
     "kernels::SparseFactor": (12, 12),
     "prior::ContactResponse": (12, 6),

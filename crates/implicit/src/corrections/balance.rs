@@ -84,7 +84,7 @@ impl Balance {
             self.at_nodes[0].extend_from_slice(&out[at..at + 3]);
         }
         mask(&self.nodes, out);
-        report.evaluations += 1;
+        report.effort.evaluations += 1;
         Ok((det, slope))
     }
 

@@ -15,10 +15,7 @@ use crate::prior::PriorTable;
 /// How the corrections of a step went.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Report {
-    /// Iterations made.
-    pub iterations: u32,
-    /// Evaluations of the element forces.
-    pub evaluations: u32,
+    pub effort: Effort,
     /// `|r|` at the end over `|r|` of the guess.
     pub residual: f32,
     /// Root mean square over the nodes of what a further iteration would move, estimated, mm.
@@ -39,12 +36,23 @@ pub struct Report {
     pub substeps: u32,
 }
 
+/// What a step took; that of its shorter ones adds up.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Effort {
+    /// Iterations made.
+    pub iterations: u32,
+    /// Evaluations of the element forces.
+    pub evaluations: u32,
+}
+
 impl Report {
     /// Of both together, the second of which is the state's.
     pub(super) fn and(&self, second: &Report) -> Report {
         Report {
-            iterations: self.iterations + second.iterations,
-            evaluations: self.evaluations + second.evaluations,
+            effort: Effort {
+                iterations: self.effort.iterations + second.effort.iterations,
+                evaluations: self.effort.evaluations + second.effort.evaluations,
+            },
             ..*second
         }
     }

@@ -41,7 +41,7 @@ impl FieldStep<'_> {
                 break;
             }
             det = self.improve(u, g, det)?;
-            self.report.iterations += 1;
+            self.report.effort.iterations += 1;
             // What a further iteration would move is told from what this one has moved and how far it has brought the residual down.
             self.report.remaining_mm = self.remaining(env, g, size)?;
             if self.solver.motion.suffices(

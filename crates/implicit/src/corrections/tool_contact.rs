@@ -119,7 +119,7 @@ impl ToolStep<'_> {
         (self.solver.fields.u, self.solver.fields.g) = (u, g);
         let went = result?;
         // What fell back is a linear response, too, or no answer to the tools at all.
-        let is_uncorrected = self.report.iterations == 0 || self.report.fell_back;
+        let is_uncorrected = self.report.effort.iterations == 0 || self.report.fell_back;
         let uncorrected = is_uncorrected.then_some(went);
         self.solver.next.level = self.report.level as u32;
         self.solver.end(&mut self.report, uncorrected)?;
@@ -327,7 +327,7 @@ pub(super) fn is_spent(
         return false;
     }
     let most = input.enough.iterations + iterations * (EVALUATIONS - 1) + MORE_EVALUATIONS;
-    report.evaluations >= most
+    report.effort.evaluations >= most
 }
 
 /// Tissue `u` in the step.

@@ -102,7 +102,7 @@ impl ToolStep<'_> {
                 return Ok(());
             }
             let better = self.improve_at(at, 1.0)?;
-            self.report.iterations += 1;
+            self.report.effort.iterations += 1;
             made.iterations += 1;
             // A failure forgets the pairs, so that the next direction is another one: where that fails too, nothing helps. Where it is dear
             // none is worth a second one.
