@@ -42,14 +42,8 @@ pub struct FarField {
     /// Rest volume of each chunk times its stiffness over the material's, mm³. After a cut these are the chunks of the intact body, with all that their
     /// elements have become.
     pub(super) volumes: Vec<f64>,
-    /// Those of the chunks that the elements are packed in.
-    pub(super) packed_volumes: Vec<f64>,
-    /// Where each chunk's nodes start in the two lists below `[C+1]`.
-    starts: Vec<u32>,
-    /// Nodes of each chunk whose displacement changes its mean gradient, those of its border.
-    nodes: Vec<u32>,
-    /// `sum_e v_e grad N` of such a node, mm².
-    weights: Vec<[f32; 3]>,
+    pub(super) packed: PackedChunks,
+    borders: Borders,
     /// `sum_e v_e grad Phi` of each chunk on the modes `[C,9,r]`, rows of the gradient one after another.
     pub(super) on_modes: Vec<f32>,
     /// How many elements a node has `[K]`.
@@ -58,8 +52,69 @@ pub struct FarField {
     pub(super) cluster_of: Vec<u16>,
     /// Mean edge of the elements, were they regular, mm.
     pub(super) edge_mm: f32,
-    /// Box of each chunk that the elements are packed in at rest, mm.
-    pub(super) boxes: Vec<[[f32; 3]; 2]>,
+}
+
+/// The chunks that the elements are packed in: after a cut others than those of the intact body.
+#[derive(HeldBytes)]
+pub(super) struct PackedChunks {
+    /// As [`FarField::volumes`], mm³.
+    pub volumes: Vec<f64>,
+    /// Box of each at rest, mm.
+    pub boxes: Vec<[[f32; 3]; 2]>,
+}
+
+/// The nodes of each chunk whose displacement changes its mean gradient, those of its border.
+#[derive(HeldBytes)]
+struct Borders {
+    /// Where each chunk's nodes start in the two lists `[C+1]`.
+    starts: Vec<u32>,
+    nodes: Vec<u32>,
+    /// `sum_e v_e grad N` of such a node, mm².
+    weights: Vec<[f32; 3]>,
+}
+
+impl Borders {
+    /// Of no chunk yet, with room for some chunks.
+    fn room(chunks: usize) -> Result<Borders> {
+        let mut starts = memory::room(chunks + 1, WHAT)?;
+        starts.push(0);
+        Ok(Borders {
+            starts,
+            nodes: Vec::new(),
+            weights: Vec::new(),
+        })
+    }
+
+    /// Asks for room for more nodes.
+    fn reserve(&mut self, count: usize) -> Result<()> {
+        memory::reserve(&mut self.nodes, count, WHAT)?;
+        memory::reserve(&mut self.weights, count, WHAT)
+    }
+
+    /// Ends the chunk whose nodes have been pushed.
+    fn end_chunk(&mut self) {
+        self.starts.push(self.nodes.len() as u32);
+    }
+
+    /// Places of a chunk's nodes.
+    fn range(&self, chunk: usize) -> std::ops::Range<usize> {
+        self.starts[chunk] as usize..self.starts[chunk + 1] as usize
+    }
+
+    /// `sum_e v_e grad u` of a chunk under a field `[K,3]` that is zero at held nodes, mm³.
+    fn gradient(&self, chunk: usize, field: &[f32]) -> [f32; NINE] {
+        let range = self.range(chunk);
+        let mut sum = [0.0f32; NINE];
+        for (&node, weight) in self.nodes[range.clone()].iter().zip(&self.weights[range]) {
+            let u = &field[3 * node as usize..][..3];
+            for (row, u) in sum.chunks_exact_mut(3).zip(u) {
+                for (sum, weight) in row.iter_mut().zip(weight) {
+                    *sum += u * weight;
+                }
+            }
+        }
+        sum
+    }
 }
 
 impl FarField {
@@ -81,15 +136,15 @@ impl FarField {
             laws: Vec::new(),
             group: (count / CLUSTERS).max(1),
             volumes: memory::room(count, WHAT)?,
-            packed_volumes: memory::room(count, WHAT)?,
-            starts: memory::room(count + 1, WHAT)?,
-            nodes: Vec::new(),
-            weights: Vec::new(),
+            packed: PackedChunks {
+                volumes: memory::room(count, WHAT)?,
+                boxes: memory::room(count, WHAT)?,
+            },
+            borders: Borders::room(count)?,
             on_modes: memory::zeros(count * NINE * space.count(), WHAT)?,
             elements_at: memory::filled(mesh.node_count(), 0, WHAT)?,
             cluster_of: memory::filled(mesh.tets.len() / 4, 0, WHAT)?,
             edge_mm: 0.0,
-            boxes: memory::room(count, WHAT)?,
         };
         if !mesh.laws.is_empty() {
             // Chunks have one law, and so have clusters.
@@ -97,7 +152,6 @@ impl FarField {
             let laws = (0..count).map(|chunk| elements.moduli_of(chunk).law);
             own.laws = memory::collected(count, laws, WHAT)?;
         }
-        own.starts.push(0);
         for chunk in 0..count {
             own.push(body, mesh, chunk)?;
         }
@@ -129,9 +183,8 @@ impl FarField {
             }
         }
         self.volumes.push(volume);
-        self.packed_volumes.push(volume);
-        memory::reserve(&mut self.nodes, nodes.len(), WHAT)?;
-        memory::reserve(&mut self.weights, nodes.len(), WHAT)?;
+        self.packed.volumes.push(volume);
+        self.borders.reserve(nodes.len())?;
         let mut bounds = [[f32::MAX; 3], [f32::MIN; 3]];
         for (&node, sum) in nodes.iter().zip(sums) {
             let at = &mesh.positions[3 * node as usize..][..3];
@@ -142,12 +195,13 @@ impl FarField {
             // Inside of the chunk the shares of a node's elements cancel.
             let matters = sum.iter().any(|value| value.abs() > 1e-5 * largest);
             if matters && !body.held.is[node as usize] {
-                self.nodes.push(node);
-                self.weights.push(sum.map(|value| value as f32));
+                self.borders.nodes.push(node);
+                let weight = sum.map(|value| value as f32);
+                self.borders.weights.push(weight);
             }
         }
-        self.boxes.push(bounds);
-        self.starts.push(self.nodes.len() as u32);
+        self.packed.boxes.push(bounds);
+        self.borders.end_chunk();
         Ok(())
     }
 
@@ -181,17 +235,7 @@ impl FarField {
 
     /// `sum_e v_e grad u` of a chunk under a field `[K,3]` that is zero at held nodes, mm³.
     pub(super) fn gradient(&self, chunk: usize, field: &[f32]) -> [f32; NINE] {
-        let range = self.starts[chunk] as usize..self.starts[chunk + 1] as usize;
-        let mut sum = [0.0f32; NINE];
-        for (&node, weight) in self.nodes[range.clone()].iter().zip(&self.weights[range]) {
-            let u = &field[3 * node as usize..][..3];
-            for (row, u) in sum.chunks_exact_mut(3).zip(u) {
-                for (sum, weight) in row.iter_mut().zip(weight) {
-                    *sum += u * weight;
-                }
-            }
-        }
-        sum
+        self.borders.gradient(chunk, field)
     }
 
     /// Clusters.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{FarField, NINE, WHAT};
+use super::{Borders, FarField, NINE, PackedChunks, WHAT};
 use crate::bundle::Mesh;
 use crate::corrections::body::Body;
 use crate::error::Result;
@@ -43,21 +43,23 @@ impl FarField {
             laws: memory::copied(&self.laws, WHAT)?,
             group: self.group,
             volumes: memory::copied(&self.volumes, WHAT)?,
-            packed_volumes: memory::room(forces.chunk_count(), WHAT)?,
-            starts: memory::room(count + 1, WHAT)?,
-            nodes: memory::room(self.nodes.len(), WHAT)?,
-            weights: memory::room(self.weights.len(), WHAT)?,
+            packed: PackedChunks {
+                volumes: memory::room(forces.chunk_count(), WHAT)?,
+                boxes: memory::room(forces.chunk_count(), WHAT)?,
+            },
+            borders: Borders::room(count)?,
             on_modes: memory::copied(&self.on_modes, WHAT)?,
             elements_at: memory::room(mesh.node_count(), WHAT)?,
             cluster_of: memory::room(self.cluster_of.len() + new.len(), WHAT)?,
             edge_mm: self.edge_mm,
-            boxes: memory::room(forces.chunk_count(), WHAT)?,
         };
-        own.packed_volumes.extend_from_slice(&self.volumes);
-        own.packed_volumes.resize(forces.chunk_count(), 0.0);
-        own.boxes.extend_from_slice(&self.boxes);
+        own.borders.reserve(self.borders.nodes.len())?;
+        let packed = &mut own.packed;
+        packed.volumes.extend_from_slice(&self.volumes);
+        packed.volumes.resize(forces.chunk_count(), 0.0);
+        packed.boxes.extend_from_slice(&self.packed.boxes);
         for chunk in count..forces.chunk_count() {
-            own.boxes.push(bounds(mesh, forces.chunk_nodes(chunk)));
+            packed.boxes.push(bounds(mesh, forces.chunk_nodes(chunk)));
         }
         own.elements_at.extend_from_slice(&self.elements_at);
         own.elements_at.resize(mesh.node_count(), 0);
@@ -72,7 +74,6 @@ impl FarField {
             .iter()
             .map(|(parent, _)| self.cluster_of[*parent as usize]);
         own.cluster_of.extend(clusters);
-        own.starts.push(0);
         let is_changed = is_changed(self, gone, count)?;
         for (chunk, is_changed) in is_changed.into_iter().enumerate() {
             if is_changed {
@@ -85,13 +86,13 @@ impl FarField {
                 };
                 own.take_anew(&packed)?;
             } else {
-                let range = self.starts[chunk] as usize..self.starts[chunk + 1] as usize;
-                memory::reserve(&mut own.nodes, range.len(), WHAT)?;
-                memory::reserve(&mut own.weights, range.len(), WHAT)?;
-                own.nodes.extend_from_slice(&self.nodes[range.clone()]);
-                own.weights.extend_from_slice(&self.weights[range]);
+                let (range, to) = (self.borders.range(chunk), &mut own.borders);
+                to.reserve(range.len())?;
+                to.nodes
+                    .extend_from_slice(&self.borders.nodes[range.clone()]);
+                to.weights.extend_from_slice(&self.borders.weights[range]);
             }
-            own.starts.push(own.nodes.len() as u32);
+            own.borders.end_chunk();
         }
         for one in &lost.list {
             own.lose(one, lost);
@@ -120,7 +121,7 @@ impl FarField {
                     sums.push((nodes[corner as usize], sums.len(), part));
                 }
             }
-            self.packed_volumes[chunk] = volume;
+            self.packed.volumes[chunk] = volume;
             whole += volume;
         }
         self.volumes[packed.first] = whole;
@@ -136,8 +137,9 @@ impl FarField {
             let node = same[0].0;
             let matters = sum.iter().any(|value| value.abs() > 1e-5 * largest);
             if matters && !packed.body.held.is[node as usize] {
-                memory::push(&mut self.nodes, node, WHAT)?;
-                memory::push(&mut self.weights, sum.map(|value| value as f32), WHAT)?;
+                memory::push(&mut self.borders.nodes, node, WHAT)?;
+                let weight = sum.map(|value| value as f32);
+                memory::push(&mut self.borders.weights, weight, WHAT)?;
             }
         }
         Ok(())

@@ -225,7 +225,7 @@ impl NearSet {
                     < reach * reach
             })
         };
-        for (chunk, bounds) in far.boxes.iter().enumerate() {
+        for (chunk, bounds) in far.packed.boxes.iter().enumerate() {
             self.far_share[chunk] = 1.0;
             // Chunks whose box no centre reaches are not looked at node by node.
             if is_by_box(bounds) {
@@ -235,7 +235,7 @@ impl NearSet {
                 let is_reached = &self.is_reached;
                 let near = (self.subset).push(forces, chunk, |node| is_reached[node as usize]);
                 let near = memory::tried(near, WHAT)?;
-                let whole = far.packed_volumes[chunk];
+                let whole = far.packed.volumes[chunk];
                 // What rounding leaves of a chunk is nothing.
                 let share = if whole > 0.0 { near / whole } else { 1.0 };
                 self.far_share[chunk] = match share > 1.0 - 1e-4 {
