@@ -140,7 +140,7 @@ impl Clusters {
         for part in near.parts.iter() {
             let base = &mut self.base[part.cluster * NINE..][..NINE];
             for &(place, weight) in near.parts.weights(part) {
-                let u = &u[3 * near.nodes[place as usize] as usize..][..3];
+                let u = &u[3 * near.places.nodes[place as usize] as usize..][..3];
                 for (row, u) in base.chunks_exact_mut(3).zip(u) {
                     for (sum, weight) in row.iter_mut().zip(weight) {
                         *sum -= f64::from(u * weight);

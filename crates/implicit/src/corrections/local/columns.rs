@@ -52,7 +52,7 @@ impl Tangent for Response<'_> {
         }
         known.make(self, factor, room, columns)?;
         // Entry (i, j) is `e_i . P e_j` by the two levels of the preconditioner: the factor's move in the core, and the work of the force on the modes times their answer.
-        let (size, modes) = (3 * self.near.core, self.env.space.count());
+        let (size, modes) = (3 * self.near.places.core, self.env.space.count());
         let order = 3 * columns.len();
         let at = |column: u32| known.columns.iter().position(|c| *c == column).unwrap_or(0);
         for (j, &column) in columns.iter().enumerate() {
@@ -64,18 +64,18 @@ impl Tangent for Response<'_> {
                 // The upper triangle alone; the matrix is symmetric because `P` is.
                 for (i, &row) in columns[..=j].iter().enumerate() {
                     let node = self.env.prior.contact_nodes[row as usize];
-                    let place = self.near.place(node);
+                    let place = self.near.places.of(node);
                     let is_diagonal = i == j;
                     let row = at(row);
                     for a in 0..3 {
                         let work = &known.on_modes[(3 * row + a) * modes..][..modes];
                         let mut sum = 1e-3 * dot(work, response);
                         match place {
-                            Some(place) if place < self.near.core => {
+                            Some(place) if place < self.near.places.core => {
                                 sum += f64::from(moved[3 * place + a]);
                             }
                             // Outside of the core there is the diagonal.
-                            Some(place) if place < self.near.inside && is_diagonal => {
+                            Some(place) if place < self.near.places.inside && is_diagonal => {
                                 let block = &self.env.time_step.inverse_blocks[node as usize];
                                 sum += f64::from(1e3 * DIAGONAL_WEIGHT * block[SYMMETRIC[a][b]]);
                             }
@@ -108,7 +108,7 @@ impl NearColumns {
         columns: &[u32],
     ) -> Result<()> {
         let (env, near) = (by.env, by.near);
-        let (size, modes) = (3 * near.core, env.space.count());
+        let (size, modes) = (3 * near.places.core, env.space.count());
         // What an error has left half made is made anew.
         let known = self.columns.len();
         self.moved.truncate(3 * known * size);
@@ -128,8 +128,8 @@ impl NearColumns {
         self.modes.resize(3 * (known + count) * modes, 0.0);
         // Those of nodes in the core first: they need the factor.
         let core = |column: u32| {
-            let place = near.place(env.prior.contact_nodes[column as usize]);
-            place.filter(|place| *place < near.core)
+            let place = near.places.of(env.prior.contact_nodes[column as usize]);
+            place.filter(|place| *place < near.places.core)
         };
         self.made
             .sort_unstable_by_key(|column| (core(*column).is_none(), *column));
@@ -150,7 +150,7 @@ impl NearColumns {
             match at < in_core {
                 true => {
                     // In the core the factor balances the force: nothing of it is left there.
-                    resize(&mut room.field, 9 * near.free)?;
+                    resize(&mut room.field, 9 * near.places.free)?;
                     let moved = &moved[3 * at * size..][..3 * size];
                     factor.take_off(env, near, room, (moved, work))?;
                 }
@@ -183,7 +183,7 @@ impl NearFactor {
         room: &mut Room,
         (t, p): (&[f32], &mut [f32]),
     ) -> Result<()> {
-        let (free, modes) = (3 * near.free, env.space.count());
+        let (free, modes) = (3 * near.places.free, env.space.count());
         let count = p.len() / modes;
         let core = t.len() / count.max(1);
         for n in 0..count {

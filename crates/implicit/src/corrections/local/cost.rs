@@ -14,22 +14,22 @@ const TRY_WORK: u64 = 2_400;
 impl NearSet {
     /// Work of making it, and of its factor.
     pub(super) fn making_work(&self) -> u64 {
-        SET_WORK * self.nodes.len() as u64 + self.factor_work()
+        SET_WORK * self.places.nodes.len() as u64 + self.factor_work()
     }
 
     pub(super) fn factor_work(&self) -> u64 {
-        FACTOR_WORK * self.core as u64
+        FACTOR_WORK * self.places.core as u64
     }
 
     pub(super) fn base_work(&self) -> u64 {
-        BASE_WORK * self.nodes.len() as u64
+        BASE_WORK * self.places.nodes.len() as u64
     }
 
     pub(super) fn direction_work(&self) -> u64 {
-        DIRECTION_WORK * self.nodes.len() as u64
+        DIRECTION_WORK * self.places.nodes.len() as u64
     }
 
     pub(super) fn try_work(&self) -> u64 {
-        TRY_WORK * self.nodes.len() as u64
+        TRY_WORK * self.places.nodes.len() as u64
     }
 }

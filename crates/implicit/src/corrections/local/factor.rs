@@ -59,12 +59,14 @@ pub(in crate::corrections) struct NearFactor {
 impl NearFactor {
     /// Takes the pattern of another near set.
     pub fn plan(&mut self, near: &NearSet, rest: &[f32]) -> Result<()> {
-        let (elements, core) = (&near.elements, near.core);
+        let (elements, core) = (&near.elements, near.places.core);
         self.factor.forget();
         self.made.clear();
         self.points.clear();
         memory::fit(&mut self.points, core, WHAT)?;
-        let nodes = near.nodes[..core].iter().map(|node| 3 * *node as usize);
+        let nodes = near.places.nodes[..core]
+            .iter()
+            .map(|node| 3 * *node as usize);
         self.points
             .extend(nodes.map(|at| [rest[at], rest[at + 1], rest[at + 2]]));
         self.targets.clear();
@@ -82,7 +84,7 @@ impl NearFactor {
 
     /// Which nodes share an element with each of the core, and where the blocks of each element go.
     fn fill_rows(&mut self, near: &NearSet) -> Result<()> {
-        let (rows, core) = (&mut self.rows, near.core);
+        let (rows, core) = (&mut self.rows, near.places.core);
         let is_core = |place: &u32| (*place as usize) < core;
         rows.starts.clear();
         memory::fit(&mut rows.starts, core + 1, WHAT)?;
@@ -111,8 +113,8 @@ impl NearFactor {
         memory::fit(&mut rows.columns, 4 * most, WHAT)?;
         let entry_of = &mut self.entry_of;
         entry_of.clear();
-        memory::fit(entry_of, near.free, WHAT)?;
-        entry_of.resize(near.free, NONE);
+        memory::fit(entry_of, near.places.free, WHAT)?;
+        entry_of.resize(near.places.free, NONE);
         let mut start = 0;
         for row in 0..core {
             let end = rows.starts[row] as usize;
@@ -165,9 +167,10 @@ impl NearFactor {
     ) -> Result<bool> {
         let _span = tracing::trace_span!("factor").entered();
         let kappa = env.time_step.integrator.kappa() as f32;
-        let serves = at.is_of(near.nodes.len(), kappa) && self.change(near, at, u) <= MOST_CHANGE;
+        let serves =
+            at.is_of(near.places.nodes.len(), kappa) && self.change(near, at, u) <= MOST_CHANGE;
         if !serves {
-            at.set(&near.nodes, kappa, u)?;
+            at.set(&near.places.nodes, kappa, u)?;
         }
         self.make((env, near, far), at, last)?;
         Ok(!serves)
@@ -199,7 +202,7 @@ impl NearFactor {
             "mesh.safetensors",
             format!(
                 "the stiffness of {} nodes is not finite: remake the bundle",
-                near.core
+                near.places.core
             ),
         ))
     }
@@ -208,7 +211,7 @@ impl NearFactor {
     fn change(&self, near: &NearSet, at: &Linearisation, u: &[f32]) -> f32 {
         let before = at.u.as_chunks::<3>().0;
         let moved = |place: u32| {
-            let now = &u[3 * near.nodes[place as usize] as usize..][..3];
+            let now = &u[3 * near.places.nodes[place as usize] as usize..][..3];
             [0, 1, 2].map(|axis| now[axis] - before[place as usize][axis])
         };
         let core = self.targets.iter();
@@ -238,7 +241,7 @@ impl NearFactor {
             let stiffness = element.steady_stiffness(&state, moduli);
             add(&mut self.rows.blocks, targets, &stiffness);
         }
-        for (row, &node) in near.nodes[..near.core].iter().enumerate() {
+        for (row, &node) in near.places.nodes[..near.places.core].iter().enumerate() {
             let inertia = kappa * env.body.mass[node as usize];
             if let Some(own) = self.rows.position(row, row as u32) {
                 for axis in 0..3 {

@@ -119,16 +119,16 @@ impl LocalSolver {
         }
         // On nodes without columns.
         let (near, field) = (&self.set.near, &mut self.spare.room.field);
-        resize(field, 3 * near.free)?;
+        resize(field, 3 * near.places.free)?;
         each_load(problem, near, |place, force| {
-            let node = near.nodes[place / 3];
+            let node = near.places.nodes[place / 3];
             if !matches!(env.prior.column_for(&env.held.is, node), Some((_, true))) {
                 add(1.0, &force, &mut field[place..]);
             }
         });
         near.project(env, field, &mut self.spare.room.q);
         let work = &mut self.spare.on_modes;
-        env.on_modes_in(&near.ranges, &self.spare.room.q, work);
+        env.on_modes_in(&near.blocks.ranges, &self.spare.room.q, work);
         add(-1.0, work, p);
         Ok(())
     }
@@ -160,19 +160,19 @@ impl LocalSolver {
         let preconditioner = &*step.preconditioner;
         let (near, room) = (&self.set.near, &mut self.spare.room);
         // Places are sorted: core, other inside nodes, free border, held border. So `..core` is the core's part of any list by place.
-        let core = 3 * near.core;
+        let core = 3 * near.places.core;
         // `B r` in the core, in place; the residual of the core becomes the move that balances it.
         let (t, outer) = self.residuals.reduced.r.split_at_mut(core);
         let rows = outer.as_chunks::<3>().0.iter();
         let places = self.d.step.t[core..].as_chunks_mut::<3>().0.iter_mut();
-        for ((t, r), &node) in places.zip(rows).zip(&near.nodes[near.core..]) {
+        for ((t, r), &node) in places.zip(rows).zip(&near.places.nodes[near.places.core..]) {
             let [xx, xy, xz, yy, yz, zz] = env.time_step.inverse_blocks[node as usize];
             t[0] += DIAGONAL_WEIGHT * (xx * r[0] + xy * r[1] + xz * r[2]);
             t[1] += DIAGONAL_WEIGHT * (xy * r[0] + yy * r[1] + yz * r[2]);
             t[2] += DIAGONAL_WEIGHT * (xz * r[0] + yz * r[1] + zz * r[2]);
         }
         let p = &mut self.residuals.reduced.p;
-        resize(&mut room.field, 3 * near.free)?;
+        resize(&mut room.field, 3 * near.places.free)?;
         room.field[..core].copy_from_slice(t);
         self.set.factor.solve(env.isa, t);
         self.set.factor.take_off(env, near, room, (t, p))?;
@@ -181,8 +181,8 @@ impl LocalSolver {
         preconditioner.respond_on_modes(env, p, &mut self.spare.solved)?;
         add(1.0, &self.spare.solved, &mut self.d.step.c);
         add(1.0, t, &mut self.d.step.t);
-        env.near_coordinates(&self.spare.solved, &near.ranges, &mut room.q);
-        resize(&mut room.linear, 3 * near.nodes.len())?;
+        env.near_coordinates(&self.spare.solved, &near.blocks.ranges, &mut room.q);
+        resize(&mut room.linear, 3 * near.places.nodes.len())?;
         near.decode(env, &room.q, &mut room.linear)?;
         // In the core the field that the move of the modes stretches over it takes its place.
         self.set.factor.stretch(&room.linear, t);
@@ -251,8 +251,8 @@ impl LocalSolver {
         let (near, reduced) = (&self.set.near, &mut self.residuals.reduced);
         for &(dof, force) in &self.spare.loads {
             let node = env.prior.contact_nodes[dof as usize / 3];
-            if near.holds(node)
-                && let Some(place) = near.place(node)
+            if near.places.holds(node)
+                && let Some(place) = near.places.of(node)
             {
                 reduced.r[3 * place + dof as usize % 3] += 1e3 * force;
             }
@@ -267,7 +267,7 @@ impl LocalSolver {
     /// `Phi c` of the direction at the near nodes.
     pub(super) fn decode_direction(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
-        let (ranges, q) = (&self.set.near.ranges, &mut self.spare.room.q);
+        let (ranges, q) = (&self.set.near.blocks.ranges, &mut self.spare.room.q);
         env.near_coordinates(&self.d.step.c, ranges, q);
         self.set.near.decode(env, q, &mut self.d.modes)
     }
@@ -276,7 +276,7 @@ impl LocalSolver {
     fn measure_direction(&mut self, env: Env<'_>) {
         let mut square = 0.0f64;
         let rows = self.d.step.t.as_chunks::<3>().0.iter();
-        for (t, &node) in rows.zip(&self.set.near.nodes) {
+        for (t, &node) in rows.zip(&self.set.near.places.nodes) {
             // Weighted by mass, so that a fine mesh near the tool counts no more than its volume does.
             let own: f32 = t.iter().map(|t| t * t).sum();
             square += f64::from(own) * f64::from(env.body.mass[node as usize]);
@@ -293,7 +293,7 @@ impl LocalSolver {
     /// Work of the tools' loads over the direction, nJ.
     fn work(&self, problem: &ContactProblem) -> f64 {
         let mut sum = 0.0f64;
-        let inside = 3 * self.set.near.inside;
+        let inside = 3 * self.set.near.places.inside;
         each_load(problem, &self.set.near, |place, force| {
             for (axis, force) in force.into_iter().enumerate() {
                 let at = place + axis;

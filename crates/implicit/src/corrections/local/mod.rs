@@ -25,6 +25,7 @@ mod linear;
 mod linearisation;
 mod near;
 mod pairs;
+mod places;
 mod record;
 mod sets;
 mod settle;
@@ -150,8 +151,8 @@ impl LocalSolver {
         self.now.clear(&self.set.near)?;
         self.d.clear(&self.set.near)?;
         self.residuals.residual.clear(&self.set.near)?;
-        resize(&mut self.residuals.base, 3 * self.set.near.free)?;
-        resize(&mut self.residuals.inner, 3 * self.set.near.free)?;
+        resize(&mut self.residuals.base, 3 * self.set.near.places.free)?;
+        resize(&mut self.residuals.inner, 3 * self.set.near.places.free)?;
         // `p_0 = Phi^T r_0`: of the base, at all nodes.
         step.preconditioner.project(env, base.residual)?;
         let q = &step.preconditioner.coordinates;
@@ -249,14 +250,15 @@ impl LocalSolver {
     /// Whether all nodes that the tools push are inside.
     pub(super) fn holds_loads(&self, problem: &ContactProblem, held: &[bool]) -> bool {
         let mut holds = true;
-        problem.each_load(|node, _| holds &= held[node as usize] || self.set.near.holds(node));
+        problem
+            .each_load(|node, _| holds &= held[node as usize] || self.set.near.places.holds(node));
         holds
     }
 
     /// Whether a direction is not worth many tries: that of a step whose work is bounded, of a body that is far in part. What inverts elements there leads into the
     /// tissue that the tool was put into, and not out of it.
     pub(super) fn is_dear(&self, problem: &ContactProblem) -> bool {
-        problem.work.is_bounded() && !self.set.near.is_all()
+        problem.work.is_bounded() && !self.set.near.places.is_all()
     }
 
     /// The level that the next step begins with, `u` being the state of this one.
@@ -288,8 +290,11 @@ impl LocalSolver {
 
     /// Puts the near nodes at part `t` of the direction.
     fn place_at(&mut self, base: &[f32], t: f32) {
-        let inside = 3 * self.set.near.inside;
-        for (place, &node) in self.set.near.nodes[..self.set.near.free].iter().enumerate() {
+        let inside = 3 * self.set.near.places.inside;
+        for (place, &node) in self.set.near.places.nodes[..self.set.near.places.free]
+            .iter()
+            .enumerate()
+        {
             for axis in 0..3 {
                 let (at, from) = (3 * place + axis, 3 * node as usize + axis);
                 let mut moved = self.now.modes[at];
@@ -313,7 +318,7 @@ impl LocalSolver {
         let det = near.internal(&self.residuals.trial, inner);
         let kappa = env.time_step.integrator.kappa() as f32;
         let rows = inner.as_chunks_mut::<3>().0.iter_mut();
-        for (r, &node) in rows.zip(&near.nodes[..near.inside]) {
+        for (r, &node) in rows.zip(&near.places.nodes[..near.places.inside]) {
             // `kappa M (u - u_n)`, with what the past adds to it in `drift`, µN.
             let inertia = kappa * env.body.mass[node as usize];
             for (axis, r) in r.iter_mut().enumerate() {
@@ -324,9 +329,9 @@ impl LocalSolver {
         self.residuals
             .next
             .r
-            .copy_from_slice(&inner[..3 * near.inside]);
+            .copy_from_slice(&inner[..3 * near.places.inside]);
         // What the near elements have added to what is linear.
-        resize(&mut self.spare.room.field, 3 * near.free)?;
+        resize(&mut self.spare.room.field, 3 * near.places.free)?;
         for (at, added) in self.spare.room.field.iter_mut().enumerate() {
             let linear = self.now.linear[at] + t * self.d.linear[at];
             *added = inner[at] - self.residuals.base[at] - linear;
@@ -338,7 +343,7 @@ impl LocalSolver {
             &mut self.residuals.next.p,
         );
         near.project(env, &self.spare.room.field, q);
-        env.on_modes_in(&near.ranges, q, &mut self.spare.on_modes);
+        env.on_modes_in(&near.blocks.ranges, q, &mut self.spare.on_modes);
         self.spare.more_on_modes.copy_from_slice(&self.now.step.c);
         add(t, &self.d.step.c, &mut self.spare.more_on_modes);
         let far_det = (self.clusters).added_on_modes(env, far, &self.spare.more_on_modes, p)?;
@@ -353,8 +358,8 @@ impl LocalSolver {
 /// Calls with the place (as an index of fields) and the share, µN, of each free near node in the tools' loads.
 fn each_load(problem: &ContactProblem, near: &NearSet, mut take: impl FnMut(usize, [f32; 3])) {
     problem.each_load(|node, force| {
-        if near.holds(node) {
-            let place = near.place(node).unwrap_or_default();
+        if near.places.holds(node) {
+            let place = near.places.of(node).unwrap_or_default();
             take(3 * place, force.to_array().map(|f| 1e3 * f));
         }
     });

@@ -1,8 +1,7 @@
 //! The elements near the tools: which they are, their forces, and how coordinates of the block bases reach their nodes.
 //!
-//! Near are the elements of the nodes that lie within a reach of the set's *centres*, nodes that tools have touched. A *place* is the position of a
-//! node in [`NearSet::nodes`]: first the free nodes all of whose elements are near ([`NearSet::inside`] of them, `S` in the formulas), then the
-//! other free ones, then those that are held.
+//! Near are the elements of the nodes that lie within a reach of the set's *centres*, nodes that tools have touched. How
+//! they are numbered [`Places`] tells.
 
 use std::ops::Range;
 
@@ -10,6 +9,7 @@ use ::elements::{ElementForces, Subset};
 
 use super::centres::{is_by, nearest_squared};
 use super::linear::{LinearElements, Parts, WHAT};
+use super::places::Places;
 use crate::corrections::far::FarField;
 use crate::corrections::precondition::Env;
 use crate::error::Result;
@@ -34,41 +34,66 @@ const CORE_MM: f32 = 20.0;
 const CORE_EDGES: f32 = 4.0;
 /// Nodes of the core, unless so few lie within an edge of the centres.
 const MOST_CORE: usize = 700;
-/// A node that is not near.
-const NONE: u32 = u32::MAX;
 
 /// What is near.
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct NearSet {
     pub centres: Vec<u32>,
-    /// By chunk of the body: the share of its volume that is not near.
-    pub far_share: Vec<f32>,
-    pub nodes: Vec<u32>,
-    /// Places that are inside, and those that are free.
-    pub inside: usize,
-    pub free: usize,
     /// Index of [`WIDER`].
     pub level: usize,
-    /// Inside places that lie closest to the centres: the first ones.
-    pub core: usize,
-    /// By node; [`NONE`] elsewhere.
-    places: Vec<u32>,
-    /// Within reach of a centre, and near elements at a node, while a set is filled.
+    pub places: Places,
+    /// By chunk of the body: the share of its volume that is not near.
+    pub far_share: Vec<f32>,
+    marks: Marks,
+    chosen: Chosen,
+    pub(super) elements: LinearElements,
+    /// What of the far field's clusters is near.
+    pub(super) parts: Parts,
+    pub blocks: Blocks,
+    /// How many of the parts that follow from the centres have been made for it.
+    pub(super) made: u32,
+}
+
+/// What is known of nodes while a set is filled.
+#[derive(HeldBytes)]
+struct Marks {
+    /// By node: within reach of a centre, and how many near elements it has.
     is_reached: Vec<bool>,
     counts: Vec<u16>,
     /// Of the near nodes from the nearest centre, squared, mm².
     distances: Vec<f32>,
+}
+
+/// The near elements with their law.
+#[derive(HeldBytes)]
+struct Chosen {
     subset: Subset,
     /// By number in the mesh.
     is_near: Vec<bool>,
-    pub(super) elements: LinearElements,
-    /// What of the far field's clusters is near.
-    pub(super) parts: Parts,
+}
+
+/// The blocks of the basis that near nodes are of.
+#[derive(HeldBytes)]
+pub(in crate::corrections) struct Blocks {
     plan: RowPlan,
-    /// Coordinates of the blocks that near nodes are of.
+    /// Their coordinates.
     pub ranges: Vec<Range<usize>>,
-    /// How many of the parts that follow from the centres have been made for it.
-    pub(super) made: u32,
+}
+
+impl Blocks {
+    /// Takes those of the free nodes that have places.
+    fn refill(&mut self, env: Env<'_>, places: &Places) -> Result<()> {
+        let basis = env.prior.basis();
+        let row_of = |node: u32| places.free_of(node);
+        self.plan.refill(&basis, places.free, row_of)?;
+        self.ranges.clear();
+        memory::fit(&mut self.ranges, basis.rank_offsets.len(), WHAT)?;
+        for block in self.plan.blocks() {
+            let ends = &basis.rank_offsets[block..block + 2];
+            self.ranges.push(ends[0] as usize..ends[1] as usize);
+        }
+        Ok(())
+    }
 }
 
 impl NearSet {
@@ -77,40 +102,26 @@ impl NearSet {
         let (count, chunks) = (env.body.mass.len(), env.body.forces.chunk_count());
         Ok(NearSet {
             centres: Vec::new(),
-            far_share: memory::filled(chunks, 1.0, WHAT)?,
-            nodes: Vec::new(),
-            inside: 0,
-            free: 0,
             level: 0,
-            core: 0,
-            places: memory::filled(count, NONE, WHAT)?,
-            is_reached: memory::filled(count, false, WHAT)?,
-            counts: memory::filled(count, 0, WHAT)?,
-            distances: Vec::new(),
-            subset: memory::tried(Subset::new(&env.body.forces), WHAT)?,
-            is_near: Vec::new(),
+            places: Places::new(count)?,
+            far_share: memory::filled(chunks, 1.0, WHAT)?,
+            marks: Marks {
+                is_reached: memory::filled(count, false, WHAT)?,
+                counts: memory::filled(count, 0, WHAT)?,
+                distances: Vec::new(),
+            },
+            chosen: Chosen {
+                subset: memory::tried(Subset::new(&env.body.forces), WHAT)?,
+                is_near: Vec::new(),
+            },
             elements: LinearElements::default(),
             parts: Parts::default(),
-            plan: RowPlan::try_region(&env.prior.basis(), &[], true)?,
-            ranges: Vec::new(),
+            blocks: Blocks {
+                plan: RowPlan::try_region(&env.prior.basis(), &[], true)?,
+                ranges: Vec::new(),
+            },
             made: 0,
         })
-    }
-
-    /// The place of a node, where it has one.
-    pub fn place(&self, node: u32) -> Option<usize> {
-        let place = self.places[node as usize];
-        (place != NONE).then_some(place as usize)
-    }
-
-    /// Whether all of the body is near.
-    pub fn is_all(&self) -> bool {
-        self.nodes.len() == self.places.len()
-    }
-
-    /// Whether a free node is inside.
-    pub fn holds(&self, node: u32) -> bool {
-        (self.places[node as usize] as usize) < self.inside
     }
 
     /// Whether it is what lies about some centres, as far as a level reaches.
@@ -128,69 +139,47 @@ impl NearSet {
         self.made = 0;
         self.level = level;
         memory::replace(&mut self.centres, centres, WHAT)?;
-        for &node in &self.nodes {
-            self.places[node as usize] = NONE;
-        }
-        let reach = match self.places.len() < FEWEST_NODES {
+        self.places.forget();
+        let count = self.places.node_count();
+        let reach = match count < FEWEST_NODES {
             true => f32::MAX,
             false => reach(far, level),
         };
         self.take_elements(env, far, rest, reach)?;
         // Where most nodes are near, all are: what the far ones save is less than their clusters cost.
-        let most = LARGEST_PART * self.places.len() as f32;
-        if reach < f32::MAX && self.nodes.len() as f32 > most {
+        let most = LARGEST_PART * count as f32;
+        if reach < f32::MAX && self.places.nodes.len() as f32 > most {
             self.take_elements(env, far, rest, f32::MAX)?;
         }
-        (self.inside, self.free, self.core) = (0, 0, 0);
         self.find_core(far, rest)?;
-        // The order of the places: core, inside, free with elements that are far, held. Each set is then a range that begins at 0.
-        let rank = |node: u32| {
-            let at = node as usize;
-            let whole = self.counts[at] == far.elements_at[at];
-            (env.held.is[at], !whole, !self.is_reached[at], node)
-        };
-        self.nodes.sort_unstable_by_key(|node| rank(*node));
-        for (place, &node) in self.nodes.iter().enumerate() {
-            let (is_held, is_cut, is_outer, _) = rank(node);
-            self.places[node as usize] = place as u32;
-            self.free += usize::from(!is_held);
-            self.inside += usize::from(!is_held && !is_cut);
-            self.core += usize::from(!is_held && !is_cut && !is_outer);
-        }
-        self.elements.take_places(&self.places);
-        self.parts.fill(&self.elements, far, self.free)?;
-        let (places, free) = (&self.places, self.free);
-        let row_of = |node: u32| {
-            let place = places[node as usize];
-            ((place as usize) < free).then_some(place)
-        };
-        let basis = env.prior.basis();
-        self.plan.refill(&basis, free, row_of)?;
-        self.ranges.clear();
-        memory::fit(&mut self.ranges, basis.rank_offsets.len(), WHAT)?;
-        for block in self.plan.blocks() {
-            let ends = &basis.rank_offsets[block..block + 2];
-            self.ranges.push(ends[0] as usize..ends[1] as usize);
-        }
-        Ok(())
+        let marks = &self.marks;
+        self.places.order(|node| {
+            let whole = marks.counts[node] == far.elements_at[node];
+            (env.held.is[node], !whole, !marks.is_reached[node])
+        });
+        self.elements.take_places(self.places.by_node());
+        self.parts.fill(&self.elements, far, self.places.free)?;
+        self.blocks.refill(env, &self.places)
     }
 
     /// Marks the nodes of the core as reached, and no others that are near.
     fn find_core(&mut self, far: &FarField, rest: &[f32]) -> Result<()> {
         let mut reach = CORE_MM.min(CORE_EDGES * far.edge_mm);
-        self.distances.clear();
-        memory::fit(&mut self.distances, self.nodes.len(), WHAT)?;
+        self.marks.distances.clear();
+        memory::fit(&mut self.marks.distances, self.places.nodes.len(), WHAT)?;
         let nearest = |node: &u32| nearest_squared(rest, &self.centres, *node);
-        self.distances.extend(self.nodes.iter().map(nearest));
+        self.marks
+            .distances
+            .extend(self.places.nodes.iter().map(nearest));
         let within = |reach: f32| {
-            let found = self.distances.iter().filter(|d| **d < reach * reach);
+            let found = self.marks.distances.iter().filter(|d| **d < reach * reach);
             found.count()
         };
         while within(reach) > MOST_CORE && reach > far.edge_mm {
             reach *= 0.75;
         }
-        for (&node, distance) in self.nodes.iter().zip(&self.distances) {
-            self.is_reached[node as usize] = *distance < reach * reach;
+        for (&node, distance) in self.places.nodes.iter().zip(&self.marks.distances) {
+            self.marks.is_reached[node as usize] = *distance < reach * reach;
         }
         Ok(())
     }
@@ -203,14 +192,14 @@ impl NearSet {
         rest: &[f32],
         reach: f32,
     ) -> Result<()> {
-        self.is_reached.fill(false);
-        self.counts.fill(0);
-        self.nodes.clear();
+        self.marks.is_reached.fill(false);
+        self.marks.counts.fill(0);
+        self.places.nodes.clear();
         self.elements.clear();
-        self.is_near.clear();
-        memory::fit(&mut self.is_near, far.cluster_of.len(), WHAT)?;
-        self.is_near.resize(far.cluster_of.len(), false);
-        self.subset.clear();
+        self.chosen.is_near.clear();
+        memory::fit(&mut self.chosen.is_near, far.cluster_of.len(), WHAT)?;
+        self.chosen.is_near.resize(far.cluster_of.len(), false);
+        self.chosen.subset.clear();
         let forces = &env.body.forces;
         let is_reached = |node: u32| is_by(rest, &self.centres, node, reach);
         let is_by_box = |[low, high]: &[[f32; 3]; 2]| {
@@ -230,10 +219,11 @@ impl NearSet {
             // Chunks whose box no centre reaches are not looked at node by node.
             if is_by_box(bounds) {
                 for &node in forces.chunk_nodes(chunk) {
-                    self.is_reached[node as usize] = is_reached(node);
+                    self.marks.is_reached[node as usize] = is_reached(node);
                 }
-                let is_reached = &self.is_reached;
-                let near = (self.subset).push(forces, chunk, |node| is_reached[node as usize]);
+                let is_reached = &self.marks.is_reached;
+                let near =
+                    (self.chosen.subset).push(forces, chunk, |node| is_reached[node as usize]);
                 let near = memory::tried(near, WHAT)?;
                 let whole = far.packed.volumes[chunk];
                 // What rounding leaves of a chunk is nothing.
@@ -244,16 +234,16 @@ impl NearSet {
                 };
             }
         }
-        memory::tried(self.subset.finish(rest.as_chunks().0), WHAT)?;
-        for (number, element) in self.subset.tetrahedra() {
+        memory::tried(self.chosen.subset.finish(rest.as_chunks().0), WHAT)?;
+        for (number, element) in self.chosen.subset.tetrahedra() {
             for node in element.corners {
-                let count = &mut self.counts[node as usize];
+                let count = &mut self.marks.counts[node as usize];
                 if *count == 0 {
-                    memory::push(&mut self.nodes, node, WHAT)?;
+                    memory::push(&mut self.places.nodes, node, WHAT)?;
                 }
                 *count += 1;
             }
-            self.is_near[number as usize] = true;
+            self.chosen.is_near[number as usize] = true;
             self.elements.push(far, number, &element)?;
         }
         Ok(())
@@ -263,7 +253,7 @@ impl NearSet {
     pub fn far_det(&self, forces: &ElementForces, chunk: usize, u: &[f32]) -> f32 {
         let nodes = forces.chunk_nodes(chunk);
         let elements = forces.chunk_tetrahedra(chunk);
-        let far = elements.filter(|(number, _)| !self.is_near[*number as usize]);
+        let far = elements.filter(|(number, _)| !self.chosen.is_near[*number as usize]);
         let dets = far.map(|(_, element)| {
             let corners = element.corners.map(|corner| nodes[corner as usize]);
             let u = corners.map(|node| [0, 1, 2].map(|k| f64::from(u[3 * node as usize + k])));
@@ -275,8 +265,8 @@ impl NearSet {
     /// `f_int` of the near elements at the free nodes, `[3 free]`, µN; the smallest det F of them all. `u [K,3]` is read at near nodes.
     pub fn internal(&mut self, u: &[f32], out: &mut [f32]) -> f32 {
         out.fill(0.0);
-        let (places, out) = (&self.places, out.as_chunks_mut::<3>().0);
-        self.subset.evaluate(u, |node, force| {
+        let (places, out) = (self.places.by_node(), out.as_chunks_mut::<3>().0);
+        self.chosen.subset.evaluate(u, |node, force| {
             if let Some(out) = out.get_mut(places[node as usize] as usize) {
                 for (out, force) in out.iter_mut().zip(force) {
                     *out -= force;
@@ -291,7 +281,7 @@ impl NearSet {
         self.elements.apply(v, some, out);
         let kappa = env.time_step.integrator.kappa() as f32;
         let rows = out.as_chunks_mut::<3>().0.iter_mut();
-        let inside = self.nodes[..self.inside].iter();
+        let inside = self.places.nodes[..self.places.inside].iter();
         for ((out, v), &node) in rows.zip(v.as_chunks::<3>().0).zip(inside) {
             let inertia = kappa * env.body.mass[node as usize];
             for (out, v) in out.iter_mut().zip(v) {
@@ -302,23 +292,30 @@ impl NearSet {
 
     /// The field of coordinates `[Q]` at the near nodes, `[.., 3]` by place: zero where they are held.
     pub fn decode(&self, env: Env<'_>, q: &[f32], out: &mut [f32]) -> Result<()> {
-        let (free, held) = out.split_at_mut(3 * self.free);
+        let (free, held) = out.split_at_mut(3 * self.places.free);
         held.fill(0.0);
         let basis = env.prior.basis();
-        Ok(decode_rows(env.isa, env.pool, &basis, &self.plan, q, free)?)
+        Ok(decode_rows(
+            env.isa,
+            env.pool,
+            &basis,
+            &self.blocks.plan,
+            q,
+            free,
+        )?)
     }
 
     /// `q = U^T r` in the near blocks of a field `[3 free]` that is zero elsewhere.
     pub fn project(&self, env: Env<'_>, r: &[f32], q: &mut [f32]) {
-        for range in &self.ranges {
+        for range in &self.blocks.ranges {
             q[range.clone()].fill(0.0);
         }
-        project_rows(env.isa, &env.prior.basis(), &self.plan, r, q);
+        project_rows(env.isa, &env.prior.basis(), &self.blocks.plan, r, q);
     }
 
     /// Adds `U^T (e_i w_j)` of vectors `w` at some places to `q [9,Q]`, field `3 i + j`.
     pub fn project_products(&self, env: Env<'_>, vectors: &[(u32, [f32; 3])], q: &mut [f32]) {
-        project_products(env.isa, &env.prior.basis(), &self.plan, vectors, q);
+        project_products(env.isa, &env.prior.basis(), &self.blocks.plan, vectors, q);
     }
 
     /// Coordinates of the blocks that some places are of.
@@ -331,7 +328,7 @@ impl NearSet {
         let offsets = env.prior.basis().rank_offsets;
         ranges.clear();
         for (place, _) in vectors {
-            let block = self.plan.block_of(*place);
+            let block = self.blocks.plan.block_of(*place);
             let own = offsets[block] as usize..offsets[block + 1] as usize;
             if !ranges.contains(&own) {
                 memory::push(ranges, own, WHAT)?;

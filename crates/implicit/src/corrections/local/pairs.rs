@@ -151,10 +151,13 @@ impl Pairs {
             step.t.copy_from_slice(&record.t);
             change.r.copy_from_slice(&record.r);
         } else {
-            let places = record.nodes.iter().map(|&node| match near.holds(node) {
-                true => near.place(node),
-                false => None,
-            });
+            let places = record
+                .nodes
+                .iter()
+                .map(|&node| match near.places.holds(node) {
+                    true => near.places.of(node),
+                    false => None,
+                });
             let kept = |from: &[f32], to: &mut [f32]| {
                 for (place, from) in places.clone().zip(from.as_chunks::<3>().0) {
                     if let Some(place) = place {
@@ -171,13 +174,15 @@ impl Pairs {
                 room.find_unknown(near, &record.nodes)?;
                 *listed = Some(slot);
             }
-            resize(&mut room.field, 3 * near.nodes.len())?;
-            resize(&mut room.linear, 3 * near.free)?;
-            env.near_coordinates(&step.c, &near.ranges, &mut room.q);
+            resize(&mut room.field, 3 * near.places.nodes.len())?;
+            resize(&mut room.linear, 3 * near.places.free)?;
+            env.near_coordinates(&step.c, &near.blocks.ranges, &mut room.q);
             near.decode(env, &room.q, &mut room.field)?;
             add(1.0, &step.t, &mut room.field);
             near.linear(env, &room.field, Some(&room.found), &mut room.linear);
-            change.r.copy_from_slice(&room.linear[..3 * near.inside]);
+            change
+                .r
+                .copy_from_slice(&room.linear[..3 * near.places.inside]);
             // Where the pair knows the nonlinear change it takes the place of the linear one.
             kept(&record.r, &mut change.r);
         }
@@ -316,10 +321,10 @@ impl Room {
     /// Lists the elements at those inside nodes that are not among the known ones.
     fn find_unknown(&mut self, near: &NearSet, known: &[u32]) -> Result<()> {
         self.unknown.clear();
-        memory::fit(&mut self.unknown, near.inside, WHAT)?;
-        self.unknown.resize(near.inside, true);
-        let places = known.iter().filter_map(|node| near.place(*node));
-        for place in places.filter(|place| *place < near.inside) {
+        memory::fit(&mut self.unknown, near.places.inside, WHAT)?;
+        self.unknown.resize(near.places.inside, true);
+        let places = known.iter().filter_map(|node| near.places.of(*node));
+        for place in places.filter(|place| *place < near.places.inside) {
             self.unknown[place] = false;
         }
         near.elements.find(&self.unknown, &mut self.found)
@@ -332,18 +337,18 @@ impl Room {
             resize(&mut self.nine, 9 * size)?;
         }
         let three = &mut self.nine[..count * size];
-        let fields = self.field.chunks_exact((3 * near.free).max(1));
+        let fields = self.field.chunks_exact((3 * near.places.free).max(1));
         for (field, q) in fields.zip(three.chunks_exact_mut(size)) {
             near.project(env, field, q);
         }
         self.used.clear();
-        memory::fit(&mut self.used, near.ranges.len(), WHAT)?;
+        memory::fit(&mut self.used, near.blocks.ranges.len(), WHAT)?;
         let is_used = |range: &&Range<usize>| {
             let mut all = three.chunks_exact(size);
             all.any(|q| q[(*range).clone()].iter().any(|q| *q != 0.0))
         };
         self.used
-            .extend(near.ranges.iter().filter(is_used).cloned());
+            .extend(near.blocks.ranges.iter().filter(is_used).cloned());
         env.on_modes_in(&self.used, three, &mut self.linear);
         Ok(())
     }

@@ -76,7 +76,11 @@ impl Record {
     ) -> Result<()> {
         memory::replace(&mut self.about, about, WHAT)?;
         memory::replace(&mut self.centres, &near.centres, WHAT)?;
-        memory::replace(&mut self.nodes, &near.nodes[..near.inside], WHAT)?;
+        memory::replace(
+            &mut self.nodes,
+            &near.places.nodes[..near.places.inside],
+            WHAT,
+        )?;
         memory::replace(&mut self.t, &step.t, WHAT)?;
         memory::replace(&mut self.r, &change.r, WHAT)?;
         memory::replace(&mut self.c, &step.c, WHAT)?;

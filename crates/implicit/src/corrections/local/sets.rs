@@ -136,9 +136,9 @@ impl Coming {
             return Ok(());
         }
         let Set { near, factor, .. } = &mut **other;
-        if next.tangent.u.len() != 3 * near.nodes.len() {
+        if next.tangent.u.len() != 3 * near.places.nodes.len() {
             let kappa = env.time_step.integrator.kappa() as f32;
-            next.tangent.set(&near.nodes, kappa, u)?;
+            next.tangent.set(&near.places.nodes, kappa, u)?;
         }
         factor.make((env, near, far), &next.tangent, &mut self.last_factor)
     }

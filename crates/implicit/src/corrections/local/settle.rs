@@ -29,7 +29,7 @@ impl LocalSolver {
             preconditioner.whole.add(env, scratch)?;
         }
         for (place, t) in self.now.step.t.as_chunks::<3>().0.iter().enumerate() {
-            let node = self.set.near.nodes[place] as usize;
+            let node = self.set.near.places.nodes[place] as usize;
             add(1.0, t, &mut scratch[3 * node..][..3]);
         }
         let (near, count) = (&self.set.near, u.len() / 3);
@@ -38,12 +38,12 @@ impl LocalSolver {
         let moved = add_smoothed(
             env,
             fields,
-            |node| near.holds(node),
+            |node| near.places.holds(node),
             &mut self.spare.partial,
         )?;
         self.measured.far_mm = (moved / count.max(1) as f64).sqrt() as f32;
         let changes = scratch.as_chunks::<3>().0.iter().zip(0..);
-        let far = changes.filter(|(_, node)| !near.holds(*node));
+        let far = changes.filter(|(_, node)| !near.places.holds(*node));
         let squares = far.map(|(change, _)| change.iter().map(|x| x * x).sum::<f32>());
         self.measured.far_moved_mm = squares.fold(0.0, f32::max).sqrt();
         Ok(())

@@ -39,8 +39,8 @@ impl Moved {
     /// No move, in the places of a near set.
     pub fn clear(&mut self, near: &NearSet) -> Result<()> {
         self.step.clear(near)?;
-        resize(&mut self.linear, 3 * near.free)?;
-        resize(&mut self.modes, 3 * near.nodes.len())?;
+        resize(&mut self.linear, 3 * near.places.free)?;
+        resize(&mut self.modes, 3 * near.places.nodes.len())?;
         self.stiff.fill(0.0);
         Ok(())
     }

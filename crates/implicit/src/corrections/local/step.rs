@@ -34,7 +34,7 @@ impl Step {
     /// No step, in the places of a near set.
     pub fn clear(&mut self, near: &NearSet) -> Result<()> {
         self.c.fill(0.0);
-        resize(&mut self.t, 3 * near.inside)
+        resize(&mut self.t, 3 * near.places.inside)
     }
 
     /// `self += factor other`.
@@ -63,7 +63,7 @@ impl Change {
     /// No change, in the places of a near set.
     pub fn clear(&mut self, near: &NearSet) -> Result<()> {
         self.p.fill(0.0);
-        resize(&mut self.r, 3 * near.inside)
+        resize(&mut self.r, 3 * near.places.inside)
     }
 
     /// Takes what another holds.

@@ -144,12 +144,15 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     let (_, u) = bench.smooth(&mut random, base_mm);
     let middle = bench.mesh.domain_nodes[bench.mesh.domain_nodes.len() / 2];
     let (local, mut step) = bench.begun(&input, &mut solver, &u, middle);
-    assert!(local.set.near.inside > 20 && local.set.near.nodes.len() < bench.mesh.node_count() / 2);
+    assert!(
+        local.set.near.places.inside > 20
+            && local.set.near.places.nodes.len() < bench.mesh.node_count() / 2
+    );
 
     let (c, _) = bench.smooth(&mut random, step_mm);
     local.d.step.clear(&local.set.near).unwrap();
     local.d.step.c.copy_from_slice(&c);
-    local.d.step.t = random.normal(3 * local.set.near.inside, 0.05 * step_mm);
+    local.d.step.t = random.normal(3 * local.set.near.places.inside, 0.05 * step_mm);
     local.decode_direction(&mut step).unwrap();
     let stiff = &mut local.d.stiff;
     step.preconditioner.stiffen(env, &c, stiff).unwrap();
@@ -165,9 +168,12 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
         .settle(&mut step, &bench.zero, (&mut scratch, &mut whole), false)
         .unwrap();
     let at_base = local.residuals.base_modes.clone();
-    let (near, r_found) = (local.set.near.nodes.clone(), local.residuals.next.r.clone());
+    let (near, r_found) = (
+        local.set.near.places.nodes.clone(),
+        local.residuals.next.r.clone(),
+    );
     let before = local.residuals.base.clone();
-    let inside = local.set.near.inside;
+    let inside = local.set.near.places.inside;
     let (mut r, still) = (bench.zero.clone(), &bench.zero);
     let mut report = Report::default();
     solver
@@ -212,8 +218,8 @@ fn contact_has_the_compliance_of_the_preconditioner() {
     let (local, mut step) = bench.begun(&input, &mut solver, &u, nodes[nodes.len() / 2]);
     // Two in the core, two outside of it.
     let all = 0..nodes.len() as u32;
-    let place = |column: &u32| local.set.near.place(nodes[*column as usize]);
-    let (core, inside) = (local.set.near.core, local.set.near.inside);
+    let place = |column: &u32| local.set.near.places.of(nodes[*column as usize]);
+    let (core, inside) = (local.set.near.places.core, local.set.near.places.inside);
     let within = |from: usize, to: usize| {
         let is_there = move |column: &u32| place(column).is_some_and(|p| (from..to).contains(&p));
         all.clone().filter(is_there).take(2)
@@ -240,11 +246,11 @@ fn contact_has_the_compliance_of_the_preconditioner() {
         // The preconditioner's answer to 1 mN there, at all of them.
         local.spare.loads = vec![(3 * columns[from / 3] + (from % 3) as u32, 1.0)];
         local.d.step.clear(&local.set.near).unwrap();
-        resize(&mut local.d.modes, 3 * local.set.near.nodes.len()).unwrap();
+        resize(&mut local.d.modes, 3 * local.set.near.places.nodes.len()).unwrap();
         local.respond(&mut step).unwrap();
         for to in 0..order {
             let node = nodes[columns[to / 3] as usize];
-            let at = 3 * local.set.near.place(node).unwrap() + to % 3;
+            let at = 3 * local.set.near.places.of(node).unwrap() + to % 3;
             let found = f64::from(local.d.step.t[at] + local.d.modes[at]);
             let wanted = upper[from.min(to) * order + from.max(to)];
             assert!(
@@ -258,10 +264,10 @@ fn contact_has_the_compliance_of_the_preconditioner() {
 /// What is near, and a solve of its factor.
 fn near_of(local: &mut LocalSolver) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
     let Set { near, factor, .. } = &mut local.set;
-    let mut t = vec![1.0; 3 * near.core];
+    let mut t = vec![1.0; 3 * near.places.core];
     factor.solve(Isa::detect(), &mut t);
     let bits = t.iter().map(|x| x.to_bits()).collect();
-    (near.centres.clone(), near.nodes.clone(), bits)
+    (near.centres.clone(), near.places.nodes.clone(), bits)
 }
 
 /// The next set takes a part a step and has the bits of one that is made at once, also where steps are made again or the solver is another one.
