@@ -43,18 +43,18 @@ impl SparseFactor {
         });
         // Which half a node is in: 0, 1; 2 for those of the second that touch the first.
         for &node in &nodes[..middle] {
-            self.local[node as usize] = 0;
+            self.room.local[node as usize] = 0;
         }
         for &node in &nodes[middle..] {
-            self.local[node as usize] = 1;
+            self.room.local[node as usize] = 1;
         }
         for &node in &nodes[middle..] {
-            let touches = |column: &u32| self.local.get(*column as usize) == Some(&0);
+            let touches = |column: &u32| self.room.local.get(*column as usize) == Some(&0);
             if matrix.row(node as usize).iter().any(touches) {
-                self.local[node as usize] = 2;
+                self.room.local[node as usize] = 2;
             }
         }
-        let local = &mut self.local;
+        let local = &mut self.room.local;
         nodes[middle..].sort_unstable_by_key(|node| (local[*node as usize], *node));
         // The order is now: first half, second half without its border, border. The border comes last, so that neither half has entries with the other.
         let parted = nodes[middle..].partition_point(|node| local[*node as usize] == 1);

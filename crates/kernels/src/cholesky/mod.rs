@@ -59,6 +59,14 @@ pub struct SparseFactor {
     borders: Vec<u32>,
     /// Rows of `U`: of each front `3 own` rows of `3 (own + border)`, with the inverse on the diagonal.
     upper: Vec<f32>,
+    room: Room,
+    /// Whether `upper` is of the matrix that was taken last.
+    is_made: bool,
+}
+
+/// What factors and solves are made in.
+#[derive(Default, HeldBytes)]
+struct Room {
     /// The front being eliminated, and what is left of those that wait for their parents.
     front: Vec<f32>,
     waiting: Vec<f32>,
@@ -68,8 +76,21 @@ pub struct SparseFactor {
     gathered: Vec<f32>,
     permuted: Vec<f32>,
     many: ManySides,
-    /// Whether `upper` is of the matrix that was taken last.
-    is_made: bool,
+}
+
+impl Room {
+    /// For a matrix of `rows`, whose widest front has `widest`.
+    fn fit(&mut self, rows: usize, widest: usize) -> Result<()> {
+        self.front.clear();
+        memory::fit(&mut self.front, widest * widest, WHAT)?;
+        self.front.resize(widest * widest, 0.0);
+        self.gathered.clear();
+        memory::fit(&mut self.gathered, widest, WHAT)?;
+        self.gathered.resize(widest, 0.0);
+        self.permuted.clear();
+        memory::fit(&mut self.permuted, rows, WHAT)?;
+        self.many.fit(rows, widest, WHAT)
+    }
 }
 
 impl BlockRows {
@@ -109,7 +130,7 @@ impl SparseFactor {
         let count = matrix.rows();
         refill(&mut self.order, 0..count as u32)?;
         refill(&mut self.places, std::iter::repeat_n(NONE, count))?;
-        refill(&mut self.local, std::iter::repeat_n(NONE, count))?;
+        refill(&mut self.room.local, std::iter::repeat_n(NONE, count))?;
         self.fronts.clear();
         self.borders.clear();
         self.dissect(matrix, points, 0..count)?;
@@ -125,15 +146,7 @@ impl SparseFactor {
             widest = widest.max(width);
         }
         refill(&mut self.upper, std::iter::repeat_n(0.0, size))?;
-        self.front.clear();
-        memory::fit(&mut self.front, widest * widest, WHAT)?;
-        self.front.resize(widest * widest, 0.0);
-        self.gathered.clear();
-        memory::fit(&mut self.gathered, widest, WHAT)?;
-        self.gathered.resize(widest, 0.0);
-        self.permuted.clear();
-        memory::fit(&mut self.permuted, 3 * count, WHAT)?;
-        self.many.fit(3 * count, widest, WHAT)
+        self.room.fit(3 * count, widest)
     }
 
     /// The border of each front: what its own nodes and its children's borders are coupled with.
@@ -147,9 +160,9 @@ impl SparseFactor {
                 for &column in matrix.row(node as usize) {
                     if let Some(&other) = self.places.get(column as usize)
                         && other >= end
-                        && self.local[other as usize] != at as u32
+                        && self.room.local[other as usize] != at as u32
                     {
-                        self.local[other as usize] = at as u32;
+                        self.room.local[other as usize] = at as u32;
                         memory::push(&mut self.borders, other, WHAT)?;
                     }
                 }
@@ -160,8 +173,8 @@ impl SparseFactor {
                 let border = self.fronts[child].border as usize;
                 for place in border..border + self.fronts[child].border_count as usize {
                     let other = self.borders[place];
-                    if other >= end && self.local[other as usize] != at as u32 {
-                        self.local[other as usize] = at as u32;
+                    if other >= end && self.room.local[other as usize] != at as u32 {
+                        self.room.local[other as usize] = at as u32;
                         memory::push(&mut self.borders, other, WHAT)?;
                     }
                 }
@@ -171,7 +184,7 @@ impl SparseFactor {
             front.border = start as u32;
             front.border_count = (self.borders.len() - start) as u32;
         }
-        self.local.fill(NONE);
+        self.room.local.fill(NONE);
         Ok(())
     }
 
@@ -190,7 +203,7 @@ impl SparseFactor {
     /// [`field::Error::OutOfMemory`].
     pub fn factor(&mut self, isa: Isa, matrix: &BlockRows) -> Result<bool> {
         self.is_made = false;
-        self.waiting.clear();
+        self.room.waiting.clear();
         for at in 0..self.fronts.len() {
             if !self.eliminate(isa, matrix, at)? {
                 return Ok(false);
@@ -207,15 +220,15 @@ impl SparseFactor {
         let (first, width) = (front.first as usize, 3 * (own + rest));
         let border = &self.borders[border..border + rest];
         for (index, place) in (first..first + own).enumerate() {
-            self.local[place] = index as u32;
+            self.room.local[place] = index as u32;
         }
         for (index, &place) in border.iter().enumerate() {
-            self.local[place as usize] = (own + index) as u32;
+            self.room.local[place as usize] = (own + index) as u32;
         }
         if width == 0 {
             return Ok(true);
         }
-        let dense = &mut self.front[..width * width];
+        let dense = &mut self.room.front[..width * width];
         dense.fill(0.0);
         for (index, place) in (first..first + own).enumerate() {
             let node = self.order[place] as usize;
@@ -227,7 +240,7 @@ impl SparseFactor {
                 if (other as usize) < place {
                     continue;
                 }
-                let to = 3 * self.local[other as usize] as usize;
+                let to = 3 * self.room.local[other as usize] as usize;
                 let block = &matrix.blocks[start + at];
                 for (row, values) in block.as_chunks::<3>().0.iter().enumerate() {
                     dense[(3 * index + row) * width + to..][..3].copy_from_slice(values);
@@ -241,32 +254,32 @@ impl SparseFactor {
             let of = &self.fronts[child];
             let count = of.border_count as usize;
             let places = &self.borders[of.border as usize..][..count];
-            let base = self.waiting.len() - 9 * count * count;
-            let left = &self.waiting[base..];
-            let dense = &mut self.front[..width * width];
+            let base = self.room.waiting.len() - 9 * count * count;
+            let left = &self.room.waiting[base..];
+            let dense = &mut self.room.front[..width * width];
             for (i, &place) in places.iter().enumerate() {
-                let row = 3 * self.local[place as usize] as usize;
+                let row = 3 * self.room.local[place as usize] as usize;
                 for axis in 0..3 {
                     let from = &left[(3 * i + axis) * 3 * count..][..3 * count];
                     let to = &mut dense[(row + axis) * width..][..width];
                     for (j, &other) in places.iter().enumerate().skip(i) {
-                        let column = 3 * self.local[other as usize] as usize;
+                        let column = 3 * self.room.local[other as usize] as usize;
                         for k in 0..3 {
                             to[column + k] += from[3 * j + k];
                         }
                     }
                 }
             }
-            self.waiting.truncate(base);
+            self.room.waiting.truncate(base);
         }
-        let dense = &mut self.front[..width * width];
+        let dense = &mut self.room.front[..width * width];
         let mut is_positive = true;
         eliminate(isa, dense, width, 3 * own, &mut is_positive);
         let upper = &mut self.upper[front.upper..][..3 * own * width];
         upper.copy_from_slice(&dense[..3 * own * width]);
-        memory::reserve(&mut self.waiting, 9 * rest * rest, WHAT)?;
+        memory::reserve(&mut self.room.waiting, 9 * rest * rest, WHAT)?;
         for row in dense[3 * own * width..].chunks_exact(width) {
-            self.waiting.extend_from_slice(&row[3 * own..]);
+            self.room.waiting.extend_from_slice(&row[3 * own..]);
         }
         Ok(is_positive)
     }
@@ -278,30 +291,30 @@ impl SparseFactor {
     pub fn solve(&mut self, isa: Isa, x: &mut [f32]) {
         assert!(self.is_made, "there is no factor");
         assert_eq!(x.len(), 3 * self.order.len(), "length of a right side");
-        self.permuted.clear();
+        self.room.permuted.clear();
         for &node in &self.order {
             let from = 3 * node as usize;
-            self.permuted.extend_from_slice(&x[from..from + 3]);
+            self.room.permuted.extend_from_slice(&x[from..from + 3]);
         }
-        let (borders, values) = (self.borders.as_slice(), &mut self.gathered);
+        let (borders, values) = (self.borders.as_slice(), &mut self.room.gathered);
         for front in &self.fronts {
             // Right sides of a contact are zero but at a few nodes: whole branches of the dissection are skipped.
-            if front.is_zero(&self.permuted) {
+            if front.is_zero(&self.room.permuted) {
                 continue;
             }
-            let width = front.gather(borders, &self.permuted, values);
+            let width = front.gather(borders, &self.room.permuted, values);
             let upper = &self.upper[front.upper..][..3 * front.own as usize * width];
             solve_forward(isa, upper, width, &mut values[..width]);
-            front.scatter(values, &mut self.permuted);
-            front.scatter_border(borders, values, &mut self.permuted);
+            front.scatter(values, &mut self.room.permuted);
+            front.scatter_border(borders, values, &mut self.room.permuted);
         }
         for front in self.fronts.iter().rev().filter(|front| front.own > 0) {
-            let width = front.gather(borders, &self.permuted, values);
+            let width = front.gather(borders, &self.room.permuted, values);
             let upper = &self.upper[front.upper..][..3 * front.own as usize * width];
             solve_back(isa, upper, width, &mut values[..width]);
-            front.scatter(values, &mut self.permuted);
+            front.scatter(values, &mut self.room.permuted);
         }
-        for (&node, values) in self.order.iter().zip(self.permuted.as_chunks::<3>().0) {
+        for (&node, values) in self.order.iter().zip(self.room.permuted.as_chunks::<3>().0) {
             x[3 * node as usize..][..3].copy_from_slice(values);
         }
     }

@@ -24,7 +24,7 @@ impl SparseFactor {
 
     fn solve_sides(&mut self, isa: Isa, x: &mut [f32], len: usize) {
         let count = x.len() / len;
-        let ManySides { permuted, gathered } = &mut self.many;
+        let ManySides { permuted, gathered } = &mut self.room.many;
         permuted.fill([0.0; SIDES]);
         for (side, x) in x.chunks_exact(len).enumerate() {
             for (node, values) in x.as_chunks::<3>().0.iter().enumerate() {
