@@ -37,7 +37,6 @@ RECORDS = {
 # Crate and type: fields and methods at most.
 LARGER: dict[str, tuple[int, int]] = {
     "bundle::Mesh": (15, 12),
-    "kernels::DecoderTokens": (11, 8),
     "prior::ContactResponse": (12, 6),
     "prior::PriorTable": (16, 18),
     "upt::Between": (18, 5),

@@ -1,7 +1,7 @@
 //! The layers of the decoder for one tile of nodes: features in rows, nodes in lanes.
 
 use super::gemm::{BLOCK, Finish, multiply};
-use super::pack::{GROUP, panel_floats};
+use super::pack::GROUP;
 use super::scalar;
 use super::weights::{DecoderTokens, PackedDecoder};
 use crate::math::exp2_lanes;
@@ -119,17 +119,13 @@ unsafe fn layers<V: DenseLanes, const R: usize, const C: usize>(
         gather::<V>(queries, rows, 2 * h, 0, h, stream);
         gather::<V>(queries, rows, 2 * h, h, h, input);
         let width = h / decoder.heads;
-        let (key, value) = (
-            panel_floats(tokens.len(), width),
-            panel_floats(width, tokens.len()),
-        );
         for head in 0..decoder.heads {
             let first = head * width * nodes;
-            let keys = &tokens.key_panels[head * key..][..key];
+            let keys = tokens.key_panels(head);
             multiply::<V, R, C>(keys, width, input.add(first), hidden, Finish::Plain);
             let mut scale = [0.0f32; MAX_NODES];
             exponentials::<V, C>(hidden, tokens.len(), scale.as_mut_ptr());
-            let values = &tokens.value_panels[head * value..][..value];
+            let values = tokens.value_panels(head);
             let finish = Finish::Scale(scale.as_ptr());
             multiply::<V, R, C>(values, tokens.len(), hidden, attended.add(first), finish);
         }

@@ -193,6 +193,8 @@ impl PackedDecoder {
     }
 }
 
+const TOKENS: &str = "the decoder's tokens";
+
 /// One step's keys and values, packed. Made once ([`DecoderTokens::new`]), filled each step
 /// without allocation ([`DecoderTokens::set`]).
 #[derive(Debug, HeldBytes)]
@@ -204,14 +206,75 @@ pub struct DecoderTokens {
     pub(super) keys: Vec<f32>,
     /// `[L,h]`.
     pub(super) values: Vec<f32>,
-    /// A head after another: `[L, h/heads]` as panels.
-    pub(super) key_panels: Vec<f32>,
-    /// A head after another: `[h/heads, L]` as panels.
-    pub(super) value_panels: Vec<f32>,
-    key_pairs: Vec<bf16>,
-    value_pairs: Vec<bf16>,
-    key_blocks: Vec<bf16>,
-    value_blocks: Vec<bf16>,
+    /// Of each head the keys `[L, h/heads]`, and the values turned, `[h/heads, L]`.
+    key_heads: Heads,
+    value_heads: Heads,
+}
+
+/// A matrix `[outputs, depth]` of each head, packed as those of a layer are ([`Linear`]); a head after another.
+#[derive(Debug, HeldBytes)]
+struct Heads {
+    outputs: usize,
+    depth: usize,
+    panels: Vec<f32>,
+    pairs: Vec<bf16>,
+    blocks: Vec<bf16>,
+}
+
+impl Heads {
+    /// Zeros.
+    fn zeros(heads: usize, outputs: usize, depth: usize) -> field::error::Result<Heads> {
+        let (pairs, blocks) = (pair_count(outputs, depth), block_count(outputs, depth));
+        Ok(Heads {
+            outputs,
+            depth,
+            panels: memory::zeros(heads * panel_floats(outputs, depth), TOKENS)?,
+            pairs: memory::filled(heads * pairs, bf16::ZERO, TOKENS)?,
+            blocks: memory::filled(heads * blocks, bf16::ZERO, TOKENS)?,
+        })
+    }
+
+    /// Takes a head's matrix, in the layouts that a precision reads.
+    fn set(
+        &mut self,
+        head: usize,
+        precision: DecoderPrecision,
+        value: impl Fn(usize, usize) -> f32,
+    ) {
+        let (outputs, depth) = (self.outputs, self.depth);
+        let size = panel_floats(outputs, depth);
+        let panels = &mut self.panels[head * size..][..size];
+        pack(panels, outputs, depth, &value);
+        match precision {
+            DecoderPrecision::F32 => {}
+            DecoderPrecision::Bf16Vectors => {
+                let size = pair_count(outputs, depth);
+                let pairs = &mut self.pairs[head * size..][..size];
+                pack_pairs(pairs, outputs, depth, value);
+            }
+            DecoderPrecision::Bf16Tiles => {
+                let size = block_count(outputs, depth);
+                let blocks = &mut self.blocks[head * size..][..size];
+                pack_blocks(blocks, outputs, depth, value);
+            }
+        }
+    }
+
+    fn panels(&self, head: usize) -> &[f32] {
+        let size = panel_floats(self.outputs, self.depth);
+        &self.panels[head * size..][..size]
+    }
+
+    /// A head's matrix in bf16.
+    fn narrow(&self, head: usize) -> Narrow<'_> {
+        let pairs = pair_count(self.outputs, self.depth);
+        let blocks = block_count(self.outputs, self.depth);
+        Narrow {
+            outputs: self.outputs,
+            pairs: &self.pairs[head * pairs..][..pairs],
+            blocks: &self.blocks[head * blocks..][..blocks],
+        }
+    }
 }
 
 impl DecoderTokens {
@@ -225,23 +288,16 @@ impl DecoderTokens {
     /// # Errors
     /// [`field::Error::OutOfMemory`].
     pub fn try_new(decoder: &PackedDecoder, tokens: usize) -> field::error::Result<Self> {
-        const WHAT: &str = "the decoder's tokens";
         let (h, heads) = (decoder.hidden, decoder.heads);
         let width = h / heads;
-        let (key_pairs, value_pairs) = (pair_count(tokens, width), pair_count(width, tokens));
-        let (key_blocks, value_blocks) = (block_count(tokens, width), block_count(width, tokens));
         Ok(Self {
             tokens,
             hidden: h,
             heads,
-            keys: memory::zeros(tokens * h, WHAT)?,
-            values: memory::zeros(tokens * h, WHAT)?,
-            key_panels: memory::zeros(heads * panel_floats(tokens, width), WHAT)?,
-            value_panels: memory::zeros(heads * panel_floats(width, tokens), WHAT)?,
-            key_pairs: memory::filled(heads * key_pairs, bf16::ZERO, WHAT)?,
-            value_pairs: memory::filled(heads * value_pairs, bf16::ZERO, WHAT)?,
-            key_blocks: memory::filled(heads * key_blocks, bf16::ZERO, WHAT)?,
-            value_blocks: memory::filled(heads * value_blocks, bf16::ZERO, WHAT)?,
+            keys: memory::zeros(tokens * h, TOKENS)?,
+            values: memory::zeros(tokens * h, TOKENS)?,
+            key_heads: Heads::zeros(heads, tokens, width)?,
+            value_heads: Heads::zeros(heads, width, tokens)?,
         })
     }
 
@@ -262,60 +318,29 @@ impl DecoderTokens {
             let column = head * width;
             let key = |l: usize, k: usize| self.keys[l * h + column + k];
             let value = |o: usize, l: usize| values[l * h + column + o];
-            let (k, v) = (panel_floats(tokens, width), panel_floats(width, tokens));
-            pack(&mut self.key_panels[head * k..][..k], tokens, width, key);
-            pack(
-                &mut self.value_panels[head * v..][..v],
-                width,
-                tokens,
-                value,
-            );
-            let (kp, vp) = (pair_count(tokens, width), pair_count(width, tokens));
-            let (kb, vb) = (block_count(tokens, width), block_count(width, tokens));
-            match precision {
-                DecoderPrecision::F32 => {}
-                DecoderPrecision::Bf16Vectors => {
-                    pack_pairs(&mut self.key_pairs[head * kp..][..kp], tokens, width, key);
-                    pack_pairs(
-                        &mut self.value_pairs[head * vp..][..vp],
-                        width,
-                        tokens,
-                        value,
-                    );
-                }
-                DecoderPrecision::Bf16Tiles => {
-                    pack_blocks(&mut self.key_blocks[head * kb..][..kb], tokens, width, key);
-                    pack_blocks(
-                        &mut self.value_blocks[head * vb..][..vb],
-                        width,
-                        tokens,
-                        value,
-                    );
-                }
-            }
+            self.key_heads.set(head, precision, key);
+            self.value_heads.set(head, precision, value);
         }
+    }
+
+    /// A head's keys as panels, `[L, h/heads]`.
+    pub(super) fn key_panels(&self, head: usize) -> &[f32] {
+        self.key_heads.panels(head)
+    }
+
+    /// A head's values as panels, `[h/heads, L]`.
+    pub(super) fn value_panels(&self, head: usize) -> &[f32] {
+        self.value_heads.panels(head)
     }
 
     /// A head's keys in bf16, `[L, h/heads]`.
     pub(super) fn keys_of(&self, head: usize) -> Narrow<'_> {
-        let (tokens, width) = (self.tokens, self.hidden / self.heads);
-        let (pairs, blocks) = (pair_count(tokens, width), block_count(tokens, width));
-        Narrow {
-            outputs: tokens,
-            pairs: &self.key_pairs[head * pairs..][..pairs],
-            blocks: &self.key_blocks[head * blocks..][..blocks],
-        }
+        self.key_heads.narrow(head)
     }
 
     /// A head's values in bf16, `[h/heads, L]`.
     pub(super) fn values_of(&self, head: usize) -> Narrow<'_> {
-        let (tokens, width) = (self.tokens, self.hidden / self.heads);
-        let (pairs, blocks) = (pair_count(width, tokens), block_count(width, tokens));
-        Narrow {
-            outputs: width,
-            pairs: &self.value_pairs[head * pairs..][..pairs],
-            blocks: &self.value_blocks[head * blocks..][..blocks],
-        }
+        self.value_heads.narrow(head)
     }
 
     /// `L`.
