@@ -180,7 +180,7 @@ impl ReducedEngine {
                 for (b, mode) in own
                     .given_b
                     .iter_mut()
-                    .zip(table.residual.chunks_exact(self.given_q.len()))
+                    .zip(table.learned.residual.chunks_exact(self.given_q.len()))
                 {
                     *b = mode.iter().zip(&self.given_q).map(|(m, q)| m * q).sum();
                 }
@@ -266,7 +266,7 @@ impl ReducedEngine {
             for (given, prior) in q.iter_mut().zip(&record.q_prior) {
                 *given -= prior;
             }
-            let modes = Stored::F32(&table.residual);
+            let modes = Stored::F32(&table.learned.residual);
             row_dots(isa, pool, modes, &learned.mode_rows, q, &mut record.b)?;
             record.bound = norm(&record.b);
         }
@@ -329,8 +329,8 @@ impl ReducedEngine {
 fn leading(linear: &Linear, compute: Compute<'_>, record: &mut ReducedRecord) -> Result<()> {
     let (Compute { isa, pool }, table) = (compute, &linear.table);
     let (to_z, to_p) = (
-        Stored::F32(&table.force_to_z),
-        Stored::F32(&table.force_to_p),
+        Stored::F32(&table.learned.force_to_z),
+        Stored::F32(&table.learned.force_to_p),
     );
     linear.solve.expand(isa, pool, to_z, &mut record.z)?;
     linear.solve.expand(isa, pool, to_p, &mut record.p)
@@ -345,7 +345,7 @@ fn combine(
 ) -> Result<()> {
     let Compute { isa, pool } = compute;
     record.q.copy_from_slice(&record.q_prior);
-    let modes = Stored::F32(&table.residual);
+    let modes = Stored::F32(&table.learned.residual);
     Ok(accumulate_rows(
         isa,
         pool,

@@ -38,7 +38,6 @@ RECORDS = {
 LARGER: dict[str, tuple[int, int]] = {
     "bundle::Mesh": (15, 12),
     "prior::ContactResponse": (12, 6),
-    "prior::PriorTable": (16, 18),
     "upt::Between": (18, 5),
     "upt::ContactSnapshot": (18, 1),
     "upt::Counters": (11, 0),

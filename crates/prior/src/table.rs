@@ -1,17 +1,18 @@
 //! The tables of the linear response: compliance, block-wise basis, response, residual modes.
 
+mod blocks;
 mod cut;
 mod read;
 
 use std::sync::Arc;
 
 use super::compliance::{Bases, Borrowed, Compliance};
-use super::numbers::Numbers;
 use super::response_table::Response;
 use super::vibration::FreeVibration;
+use blocks::Blocks;
 use field::error::Result;
 use field::memory::{self, HeldBytes};
-use kernels::rows::{BlockBasis, Copies};
+use kernels::rows::BlockBasis;
 
 /// A node without a column near it.
 pub const NO_COLUMN: u32 = u32::MAX;
@@ -24,37 +25,73 @@ pub struct PriorTable {
     sources: Vec<u32>,
     #[held(own)]
     compliance: Arc<Compliance>,
-    block_nodes: Vec<u32>,
-    block_offsets: Vec<u32>,
-    rank_offsets: Vec<u32>,
-    /// Of a cut body: nodes with rows of their own before each block, and whose rows each node of `block_nodes` has ([`Copies`]).
-    copies: Option<(Vec<u32>, Vec<u32>)>,
-    #[held(own)]
-    basis: Arc<Numbers>,
+    blocks: Blocks,
     /// Response of a unit force on a column of the tables `[3D,Q]`, mm/mN; see [`PriorTable::stored_dof`].
     #[held(own)]
     pub response: Arc<Response>,
-    /// Residual modes `[r,Q]`; empty where the bundle has none.
-    pub residual: Vec<f32>,
-    /// `[3D,r_z]`; empty where the bundle has none.
-    pub force_to_z: Vec<f32>,
-    /// `[3D,r]`; empty where the bundle has none.
-    pub force_to_p: Vec<f32>,
+    pub learned: LearnedTables,
     /// For each node the column (index into `contact_nodes`) of itself or of the nearest contact node within
     /// four typical edges of the domain; `NO_COLUMN` for nodes farther away.
     pub nearest_column: Vec<u32>,
     /// Whether a node belongs to the domain `[K]`. A bundle may have columns of a part of the domain only.
     pub in_domain: Vec<bool>,
-    /// By node: where its rows in the basis start, where its block's coordinates start, and how many.
-    places: Vec<(u32, u32, u32)>,
     /// What the response does when the contact is gone; without it the response is zero then.
     pub vibration: Option<FreeVibration>,
+}
+
+/// The residual modes of a learned map, and what it reads of contact forces; all empty where the bundle has none.
+#[derive(Debug, Default, HeldBytes)]
+pub struct LearnedTables {
+    /// Residual modes `[r,Q]`.
+    pub residual: Vec<f32>,
+    /// `[3D,r_z]`.
+    pub force_to_z: Vec<f32>,
+    /// `[3D,r]`.
+    pub force_to_p: Vec<f32>,
 }
 
 impl PriorTable {
     /// Length of `q`.
     pub fn width(&self) -> usize {
-        self.rank_offsets.last().map_or(0, |&width| width as usize)
+        self.blocks.width()
+    }
+
+    /// Largest rank of a block.
+    pub fn widest_block(&self) -> usize {
+        self.blocks.widest()
+    }
+
+    /// Row `axis` of a node in the basis times coordinates `q`.
+    pub fn value_at(&self, node: u32, axis: usize, q: impl Fn(usize) -> f32) -> f32 {
+        self.blocks.value_at(node, axis, q)
+    }
+
+    /// Coordinates of the block that a node is of.
+    pub fn coordinates_of(&self, node: u32) -> std::ops::Range<usize> {
+        self.blocks.coordinates_of(node)
+    }
+
+    /// `q += U^T f` of a vector on one node.
+    pub fn add_row(&self, node: u32, f: [f32; 3], q: &mut [f32]) {
+        self.blocks.add_row(node, f, q);
+    }
+
+    /// Where each block's rows start in the basis `[B+1]`.
+    ///
+    /// # Errors
+    /// [`field::Error::OutOfMemory`].
+    pub fn basis_starts(&self) -> Result<Vec<usize>> {
+        self.blocks.starts()
+    }
+
+    /// The block-wise basis as the kernels take it.
+    pub fn basis(&self) -> BlockBasis<'_> {
+        self.blocks.basis()
+    }
+
+    /// `q += U^T u` of a field `[K,3]`: its coordinates in the orthonormal block bases.
+    pub fn project(&self, field: &[f32], q: &mut [f32]) {
+        self.blocks.project(field, q);
     }
 
     /// Writes the upper triangle of the compliance of `columns` (indices into `contact_nodes`, ascending) with themselves,
@@ -71,7 +108,7 @@ impl PriorTable {
         scratch: &mut Vec<f32>,
     ) {
         let bases = Bases {
-            basis: &self.basis,
+            basis: &self.blocks.numbers,
             response: &self.response,
             width: self.width(),
         };
@@ -82,7 +119,7 @@ impl PriorTable {
         let own = self.contact_nodes.len() - self.sources.len();
         let borrowed = Borrowed {
             sources: &self.sources,
-            places: &|behind| self.places[self.contact_nodes[own + behind] as usize],
+            places: &|behind| self.blocks.places[self.contact_nodes[own + behind] as usize],
         };
         (self.compliance).gather_borrowed(bases, borrowed, columns, upper, scratch);
     }
@@ -118,75 +155,8 @@ impl PriorTable {
     /// Bytes that it shares with the table of the intact body.
     pub fn shared_bytes(&self) -> usize {
         memory::behind(&self.compliance)
-            + memory::behind(&self.basis)
+            + memory::behind(&self.blocks.numbers)
             + memory::behind(&self.response)
-    }
-
-    /// Largest rank of a block.
-    pub fn widest_block(&self) -> usize {
-        let ranks = self.rank_offsets.windows(2);
-        ranks.map(|pair| pair[1] - pair[0]).max().unwrap_or(0) as usize
-    }
-
-    /// Row `axis` of a node in the basis times coordinates `q`.
-    pub fn value_at(&self, node: u32, axis: usize, q: impl Fn(usize) -> f32) -> f32 {
-        let (row, start, rank) = self.places[node as usize];
-        let row = row as usize + axis * rank as usize;
-        let columns = 0..rank as usize;
-        columns
-            .map(|at| self.basis.at(row + at) * q(start as usize + at))
-            .sum()
-    }
-
-    /// Coordinates of the block that a node is of.
-    pub fn coordinates_of(&self, node: u32) -> std::ops::Range<usize> {
-        let (_, start, rank) = self.places[node as usize];
-        start as usize..(start + rank) as usize
-    }
-
-    /// `q += U^T f` of a vector on one node.
-    pub fn add_row(&self, node: u32, f: [f32; 3], q: &mut [f32]) {
-        let (row, start, rank) = self.places[node as usize];
-        let (row, start, rank) = (row as usize, start as usize, rank as usize);
-        for (axis, f) in f.into_iter().enumerate() {
-            let from = row + axis * rank;
-            for (at, q) in q[start..start + rank].iter_mut().enumerate() {
-                *q += f * self.basis.at(from + at);
-            }
-        }
-    }
-
-    /// Where each block's rows start in the basis `[B+1]`.
-    ///
-    /// # Errors
-    /// [`field::Error::OutOfMemory`].
-    pub fn basis_starts(&self) -> Result<Vec<usize>> {
-        let mut starts = memory::room(self.rank_offsets.len(), "the linear response")?;
-        starts.push(0);
-        let offsets = match &self.copies {
-            Some((own, _)) => own,
-            None => &self.block_offsets,
-        };
-        let blocks = offsets.windows(2).zip(self.rank_offsets.windows(2));
-        for (nodes, ranks) in blocks {
-            let size = 3 * (nodes[1] - nodes[0]) as usize * (ranks[1] - ranks[0]) as usize;
-            starts.push(starts[starts.len() - 1] + size);
-        }
-        Ok(starts)
-    }
-
-    /// The block-wise basis as the kernels take it.
-    pub fn basis(&self) -> BlockBasis<'_> {
-        BlockBasis {
-            block_nodes: &self.block_nodes,
-            block_offsets: &self.block_offsets,
-            rank_offsets: &self.rank_offsets,
-            basis: self.basis.stored(),
-            copies: (self.copies.as_ref()).map(|(own, locals)| Copies {
-                row_offsets: own,
-                locals,
-            }),
-        }
     }
 
     /// The column that a contact node acts on, and whether it is the column's own node; none for a node that is held or too
@@ -198,36 +168,13 @@ impl PriorTable {
         }
         Some((column as usize, self.contact_nodes[column as usize] == node))
     }
-
-    /// `q += U^T u` of a field `[K,3]`: its coordinates in the orthonormal block bases.
-    pub fn project(&self, field: &[f32], q: &mut [f32]) {
-        for &node in &self.block_nodes {
-            let (row, start, rank) = self.places[node as usize];
-            let (mut row, start, rank) = (row as usize, start as usize, rank as usize);
-            let q = &mut q[start..start + rank];
-            for &u in &field[3 * node as usize..3 * node as usize + 3] {
-                match &*self.basis {
-                    Numbers::F32(basis) => {
-                        for (q, &phi) in q.iter_mut().zip(&basis[row..row + rank]) {
-                            *q += phi * u;
-                        }
-                    }
-                    Numbers::F16(basis) => {
-                        for (q, phi) in q.iter_mut().zip(&basis[row..row + rank]) {
-                            *q += phi.to_f32() * u;
-                        }
-                    }
-                }
-                row += rank;
-            }
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::ContactResponse;
+    use crate::numbers::Numbers;
     use kernels::Isa;
 
     /// Four nodes; columns at 0 and 1, which node 2 (of the domain) and node 3 (outside) have nearest by.
@@ -238,18 +185,18 @@ mod tests {
             contact_nodes: vec![0, 1],
             sources: Vec::new(),
             compliance: Arc::new(Compliance::Whole(compliance)),
-            block_nodes: vec![0, 1, 2, 3],
-            block_offsets: vec![0, 4],
-            rank_offsets: vec![0, 8],
-            copies: None,
-            basis: Arc::new(Numbers::F32(vec![0.0; 96])),
+            blocks: Blocks {
+                nodes: vec![0, 1, 2, 3],
+                offsets: vec![0, 4],
+                rank_offsets: vec![0, 8],
+                copies: None,
+                numbers: Arc::new(Numbers::F32(vec![0.0; 96])),
+                places: Vec::new(),
+            },
             response: Arc::new(Response::Whole(Numbers::F32(vec![0.0; 48]))),
-            residual: Vec::new(),
-            force_to_z: Vec::new(),
-            force_to_p: Vec::new(),
+            learned: LearnedTables::default(),
             nearest_column: vec![0, 1, 1, 1],
             in_domain: vec![true, true, true, false],
-            places: Vec::new(),
             vibration: None,
         }
     }

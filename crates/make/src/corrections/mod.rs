@@ -166,10 +166,10 @@ pub fn write(args: &Options) -> Result<(usize, usize)> {
         Vec::new()
     } else if args.residual {
         let width = bench.prior.width();
-        if bench.prior.residual.is_empty() {
+        if bench.prior.learned.residual.is_empty() {
             bail!("--residual: this bundle has no residual modes; leave the option out");
         }
-        let modes = bench.prior.residual.chunks_exact(width);
+        let modes = bench.prior.learned.residual.chunks_exact(width);
         modes.map(<[f32]>::to_vec).collect()
     } else {
         let found = patches::differences(&bench, args.patches, None, args.seed, &args.watch)?;

@@ -6,7 +6,8 @@
 
 use std::sync::Arc;
 
-use super::{NO_COLUMN, PriorTable};
+use super::blocks::Blocks;
+use super::{LearnedTables, NO_COLUMN, PriorTable};
 use bundle::Mesh;
 use field::error::Result;
 use field::memory;
@@ -19,7 +20,7 @@ impl PriorTable {
     /// # Errors
     /// [`field::Error::OutOfMemory`].
     pub fn cut(&self, mesh: &Mesh, parents: &[u32]) -> Result<PriorTable> {
-        let count = mesh.node_count();
+        let (count, blocks) = (mesh.node_count(), &self.blocks);
         let own = count - parents.len();
         let mut copies: Vec<(u32, u32)> = memory::room(parents.len(), WHAT)?;
         copies.extend(
@@ -29,31 +30,30 @@ impl PriorTable {
         );
         // By the block that they are of, which a block's first coordinate tells, in the order of their numbers.
         let block = |copy: &(u32, u32)| {
-            let (_, start, rank) = self.places[copy.0 as usize];
+            let (_, start, rank) = blocks.places[copy.0 as usize];
             (start, rank)
         };
         copies.sort_unstable_by_key(|copy| (block(copy), copy.1));
         let mut block_nodes = memory::room(count, WHAT)?;
         let mut locals = memory::room(count, WHAT)?;
-        let mut block_offsets = memory::room(self.block_offsets.len(), WHAT)?;
+        let mut block_offsets = memory::room(blocks.offsets.len(), WHAT)?;
         block_offsets.push(0);
         let mut left = copies.as_slice();
         let (mut first_row, mut places) = (0, memory::room(count, WHAT)?);
-        places.extend_from_slice(&self.places);
+        places.extend_from_slice(&blocks.places);
         places.resize(count, (0, 0, 0));
-        let ranges = self
-            .block_offsets
+        let ranges = (blocks.offsets)
             .windows(2)
-            .zip(self.rank_offsets.windows(2));
+            .zip(blocks.rank_offsets.windows(2));
         for (range, ranks) in ranges {
-            let nodes = &self.block_nodes[range[0] as usize..range[1] as usize];
+            let nodes = &blocks.nodes[range[0] as usize..range[1] as usize];
             block_nodes.extend_from_slice(nodes);
             locals.extend(0..nodes.len() as u32);
             let (start, rank) = (ranks[0], ranks[1] - ranks[0]);
             let is_here = |copy: &&(u32, u32)| block(copy) == (start, rank);
             let here = left.iter().take_while(is_here).count();
             for &(parent, copy) in &left[..here] {
-                let place = self.places[parent as usize];
+                let place = blocks.places[parent as usize];
                 block_nodes.push(copy);
                 locals.push((place.0 - first_row) / (3 * rank.max(1)));
                 places[copy as usize] = place;
@@ -88,19 +88,19 @@ impl PriorTable {
         }
         Ok(PriorTable {
             compliance: Arc::clone(&self.compliance),
-            block_nodes,
-            block_offsets,
-            rank_offsets: memory::copied(&self.rank_offsets, WHAT)?,
-            copies: Some((memory::copied(&self.block_offsets, WHAT)?, locals)),
-            basis: Arc::clone(&self.basis),
+            blocks: Blocks {
+                nodes: block_nodes,
+                offsets: block_offsets,
+                rank_offsets: memory::copied(&blocks.rank_offsets, WHAT)?,
+                copies: Some((memory::copied(&blocks.offsets, WHAT)?, locals)),
+                numbers: Arc::clone(&blocks.numbers),
+                places,
+            },
             response: Arc::clone(&self.response),
-            residual: Vec::new(),
-            force_to_z: Vec::new(),
-            force_to_p: Vec::new(),
+            learned: LearnedTables::default(),
             vibration: None,
             nearest_column,
             in_domain,
-            places,
             contact_nodes,
             sources,
         })

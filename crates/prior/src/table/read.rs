@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use safetensors::tensor::Dtype;
 
-use super::{NO_COLUMN, PriorTable};
+use super::blocks::Blocks;
+use super::{LearnedTables, NO_COLUMN, PriorTable};
 use crate::compliance::Compliance;
 use crate::numbers::{Numbers, fits};
 use crate::response_table::Response;
@@ -143,20 +144,24 @@ impl PriorTable {
             contact_nodes,
             sources: Vec::new(),
             compliance: Arc::new(compliance),
-            block_nodes,
-            block_offsets: narrow(block_offsets)?,
-            rank_offsets: narrow(rank_offsets)?,
-            copies: None,
-            basis: Arc::new(basis),
-            response: Arc::new(response),
-            residual: if modes > 0 {
-                learned.float("residual", &[Some(modes), Some(width)])?
-            } else {
-                Vec::new()
+            blocks: Blocks {
+                nodes: block_nodes,
+                offsets: narrow(block_offsets)?,
+                rank_offsets: narrow(rank_offsets)?,
+                copies: None,
+                numbers: Arc::new(basis),
+                places,
             },
-            force_to_z: optional("force_to_z", [dofs, response_modes])?,
-            force_to_p: optional("force_to_p", [dofs, modes])?,
-            places,
+            response: Arc::new(response),
+            learned: LearnedTables {
+                residual: if modes > 0 {
+                    learned.float("residual", &[Some(modes), Some(width)])?
+                } else {
+                    Vec::new()
+                },
+                force_to_z: optional("force_to_z", [dofs, response_modes])?,
+                force_to_p: optional("force_to_p", [dofs, modes])?,
+            },
             vibration: None,
         })
     }
