@@ -21,18 +21,18 @@ impl ContactResponse {
         out.fill(0.0);
         for &node in nodes {
             if let Some((slot, own)) = table.column_for(held, node) {
-                self.count[slot] += 1;
-                self.own[slot] |= own;
+                self.imposed.count[slot] += 1;
+                self.imposed.own[slot] |= own;
             }
         }
         for (&node, &place) in nodes.iter().zip(places) {
             let Some((slot, own)) = table.column_for(held, node) else {
                 continue;
             };
-            let share = match (self.own[slot], own) {
+            let share = match (self.imposed.own[slot], own) {
                 (true, true) => 1.0,
                 (true, false) => continue,
-                (false, _) => 1.0 / self.count[slot] as f32,
+                (false, _) => 1.0 / self.imposed.count[slot] as f32,
             };
             if let Ok(row) = self.columns.binary_search(&(slot as u32)) {
                 let out = &mut out[3 * place as usize..][..3];
@@ -42,8 +42,8 @@ impl ContactResponse {
             }
         }
         for &column in &self.columns {
-            self.count[column as usize] = 0;
-            self.own[column as usize] = false;
+            self.imposed.count[column as usize] = 0;
+            self.imposed.own[column as usize] = false;
         }
     }
 }

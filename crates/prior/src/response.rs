@@ -23,9 +23,7 @@ pub struct SolveReport {
 /// Contact forces, and the factor that is kept while the contact nodes stay the same.
 #[derive(Debug, HeldBytes)]
 pub struct ContactResponse {
-    factor: ContactFactor,
-    factored: Vec<u32>,
-    regularised: bool,
+    factored: Factored,
     pub(super) columns: Vec<u32>,
     rows: Vec<u32>,
     /// The rows of the tables that they are.
@@ -33,10 +31,25 @@ pub struct ContactResponse {
     values: Vec<f32>,
     widened: Vec<f32>,
     pub(super) forces: Vec<f32>,
-    // By column, zero between calls: sum of imposed displacements, how many, whether the column's own node is among them.
+    pub(super) imposed: Imposed,
+}
+
+/// The factor of the compliance of some rows.
+#[derive(Debug, HeldBytes)]
+struct Factored {
+    factor: ContactFactor,
+    rows: Vec<u32>,
+    regularised: bool,
+}
+
+/// What nodes impose on their columns; by column, zero between calls.
+#[derive(Debug, HeldBytes)]
+pub(super) struct Imposed {
+    /// Sum of the displacements, and how many they are.
     sum: Vec<[f32; 3]>,
-    pub(super) count: Vec<u32>,
-    pub(super) own: Vec<bool>,
+    pub count: Vec<u32>,
+    /// Whether the column's own node is among them.
+    pub own: Vec<bool>,
 }
 
 impl ContactResponse {
@@ -45,18 +58,22 @@ impl ContactResponse {
         const WHAT: &str = "the contact solve";
         let columns = table.contact_nodes.len();
         Ok(ContactResponse {
-            factor: ContactFactor::try_with_capacity(3 * columns.min(ROOM))?,
-            factored: memory::room(3 * columns, WHAT)?,
-            regularised: false,
+            factored: Factored {
+                factor: ContactFactor::try_with_capacity(3 * columns.min(ROOM))?,
+                rows: memory::room(3 * columns, WHAT)?,
+                regularised: false,
+            },
             columns: memory::room(columns, WHAT)?,
             rows: memory::room(3 * columns, WHAT)?,
             stored: memory::room(3 * columns, WHAT)?,
             values: memory::room(3 * columns, WHAT)?,
             widened: memory::zeros(6 * table.widest_block(), WHAT)?,
             forces: memory::room(3 * columns, WHAT)?,
-            sum: memory::filled(columns, [0.0; 3], WHAT)?,
-            count: memory::filled(columns, 0, WHAT)?,
-            own: memory::filled(columns, false, WHAT)?,
+            imposed: Imposed {
+                sum: memory::filled(columns, [0.0; 3], WHAT)?,
+                count: memory::filled(columns, 0, WHAT)?,
+                own: memory::filled(columns, false, WHAT)?,
+            },
         })
     }
 
@@ -78,20 +95,20 @@ impl ContactResponse {
                 continue;
             };
             report.outside |= !own && !table.in_domain[node as usize];
-            if self.count[slot] == 0 {
+            if self.imposed.count[slot] == 0 {
                 self.columns.push(slot as u32);
             }
-            if self.own[slot] {
+            if self.imposed.own[slot] {
                 continue;
             }
             if own {
-                self.own[slot] = true;
-                self.sum[slot] = [c[0], c[1], c[2]];
-                self.count[slot] = 1;
+                self.imposed.own[slot] = true;
+                self.imposed.sum[slot] = [c[0], c[1], c[2]];
+                self.imposed.count[slot] = 1;
             } else {
-                let sum = &mut self.sum[slot];
+                let sum = &mut self.imposed.sum[slot];
                 *sum = [sum[0] + c[0], sum[1] + c[1], sum[2] + c[2]];
-                self.count[slot] += 1;
+                self.imposed.count[slot] += 1;
             }
         }
         self.columns.sort_unstable();
@@ -102,35 +119,38 @@ impl ContactResponse {
             for axis in 0..3 {
                 self.rows.push(3 * column + axis as u32);
                 self.values
-                    .push(self.sum[slot][axis] / self.count[slot] as f32);
+                    .push(self.imposed.sum[slot][axis] / self.imposed.count[slot] as f32);
             }
-            self.sum[slot] = [0.0; 3];
-            self.count[slot] = 0;
-            self.own[slot] = false;
+            self.imposed.sum[slot] = [0.0; 3];
+            self.imposed.count[slot] = 0;
+            self.imposed.own[slot] = false;
         }
         self.stored.clear();
         self.stored
             .extend(self.rows.iter().map(|row| table.stored_dof(*row)));
-        if self.rows != self.factored {
-            self.factored.clear();
-            self.regularised = false;
+        if self.rows != self.factored.rows {
+            self.factored.rows.clear();
+            self.factored.regularised = false;
             if !self.rows.is_empty() {
-                self.factor.reserve(self.rows.len())?;
+                self.factored.factor.reserve(self.rows.len())?;
                 let made = self
+                    .factored
                     .factor
                     .factor(isa, &self.rows, |upper| {
                         table.gather_compliance(&self.columns, upper, &mut self.widened);
                     })
                     .map_err(|error| Error::bundle("prior.safetensors", error.to_string()))?;
-                self.regularised = made.regularised();
+                self.factored.regularised = made.regularised();
             }
-            self.factored.extend_from_slice(&self.rows);
+            self.factored.rows.extend_from_slice(&self.rows);
         }
-        report.regularised = self.regularised && !self.rows.is_empty();
+        report.regularised = self.factored.regularised && !self.rows.is_empty();
         self.forces.clear();
         self.forces.resize(self.rows.len(), 0.0);
         if !self.rows.is_empty() {
-            self.factor.solve(isa, &self.values, &mut self.forces);
+            self.factored
+                .factor
+                .solve(isa, &self.values, &mut self.forces);
         }
         Ok(report)
     }
