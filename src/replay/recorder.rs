@@ -24,13 +24,7 @@ const AFTER: usize = "\"}}\n".len();
 pub(crate) struct Recorder {
     /// Whole lines.
     text: Vec<u8>,
-    /// Those of what is being done.
-    open: Vec<u8>,
-    /// How many they are.
-    open_lines: u64,
-    /// Whether the last of them is a step, and whether that waits for its hash.
-    is_step: bool,
-    wants_digest: bool,
+    begun: Begun,
     /// Shapes with lists that instruments have had, by the place of their lines; and those of them whose lines count.
     hulls: Vec<Body>,
     known: usize,
@@ -41,6 +35,17 @@ pub(crate) struct Recorder {
     lines: u64,
     /// It has been ended.
     ended: bool,
+}
+
+/// The lines of what is being done.
+#[derive(Default)]
+struct Begun {
+    text: Vec<u8>,
+    /// How many they are.
+    lines: u64,
+    /// Whether the last of them is a step, and whether that waits for its hash.
+    is_step: bool,
+    wants_digest: bool,
 }
 
 impl Recorder {
@@ -71,14 +76,14 @@ impl Recorder {
     /// # Errors
     /// [`Error::OutOfMemory`]; then there is none.
     pub(crate) fn open(&mut self, line: &Line<'_>) -> Result<()> {
-        let written = write(&mut self.open, line);
-        let tried = |()| memory::tried(self.text.try_reserve(self.open.len()), WHAT);
+        let written = write(&mut self.begun.text, line);
+        let tried = |()| memory::tried(self.text.try_reserve(self.begun.text.len()), WHAT);
         let room = written.and_then(tried);
         if room.is_err() {
             self.drop_open();
         }
         room?;
-        self.open_lines += 1;
+        self.begun.lines += 1;
         Ok(())
     }
 
@@ -87,9 +92,9 @@ impl Recorder {
     /// # Errors
     /// [`Error::OutOfMemory`]; then there is none.
     pub(crate) fn open_step(&mut self, mut step: Step<'_>) -> Result<()> {
-        self.is_step = true;
-        self.wants_digest = (self.steps + 1).is_multiple_of(self.every);
-        step.sha256 = self.wants_digest.then_some(Cow::Borrowed(DIGEST));
+        self.begun.is_step = true;
+        self.begun.wants_digest = (self.steps + 1).is_multiple_of(self.every);
+        step.sha256 = self.begun.wants_digest.then_some(Cow::Borrowed(DIGEST));
         self.open(&Line::Step(step))
     }
 
@@ -116,27 +121,26 @@ impl Recorder {
 
     /// What the lines begun tell of has been done; `digest` is asked for the hash of a step.
     pub(crate) fn close(&mut self, digest: impl FnOnce() -> [u8; 32]) {
-        self.steps += u64::from(std::mem::take(&mut self.is_step));
-        if std::mem::take(&mut self.wants_digest) {
-            let end = self.open.len() - AFTER;
+        self.steps += u64::from(std::mem::take(&mut self.begun.is_step));
+        if std::mem::take(&mut self.begun.wants_digest) {
+            let end = self.begun.text.len() - AFTER;
             let digits = digest().into_iter().flat_map(|byte| [byte >> 4, byte & 15]);
-            let places = &mut self.open[end - DIGEST.len()..end];
+            let places = &mut self.begun.text[end - DIGEST.len()..end];
             for (place, digit) in places.iter_mut().zip(digits) {
                 *place = b"0123456789abcdef"[usize::from(digit)];
             }
         }
         // There is room.
-        self.text.append(&mut self.open);
-        self.lines += std::mem::take(&mut self.open_lines);
+        self.text.append(&mut self.begun.text);
+        self.lines += std::mem::take(&mut self.begun.lines);
         self.known = self.hulls.len();
     }
 
     /// What the lines begun tell of has failed, and changed nothing.
     pub(crate) fn drop_open(&mut self) {
-        self.open.clear();
-        self.open_lines = 0;
-        self.is_step = false;
-        self.wants_digest = false;
+        self.begun.text.clear();
+        self.begun.lines = 0;
+        (self.begun.is_step, self.begun.wants_digest) = (false, false);
         self.hulls.truncate(self.known);
     }
 
@@ -165,7 +169,7 @@ impl Recorder {
 
     /// Bytes of the heap.
     pub(crate) fn held_bytes(&self) -> usize {
-        self.text.capacity() + self.open.capacity()
+        self.text.capacity() + self.begun.text.capacity()
     }
 }
 

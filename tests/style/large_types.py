@@ -46,7 +46,6 @@ LARGER: dict[str, tuple[int, int]] = {
     "upt::Model": (18, 20),
     "upt::Nodes": (12, 2),
     "upt::Published": (12, 8),
-    "upt::Recorder": (11, 11),
     "upt::Scene": (7, 64),
     "upt::Solver": (12, 12),
     "upt::Stepped": (11, 0),
