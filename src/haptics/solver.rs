@@ -36,17 +36,37 @@ pub struct Solver {
     samples: Pushed,
     /// What they were before a solve, to which one that loses the tool goes back.
     before: Pushed,
-    /// The samples of a solve by their distance, their contacts and forces, and `W` among them.
-    rows: Vec<(f32, usize)>,
-    contacts: Vec<Contact>,
-    solved: Vec<Vector>,
-    w: Vec<f32>,
-    sweeps: Sweeps,
+    problem: Problem,
     stiffness: Stiffness,
     /// Distance to the nearest sample, mm.
     pub nearest: f32,
     /// All samples that the step pushed have slid off the tool since it. Until the next step they are the tissue's plane beneath it.
     slid: bool,
+}
+
+/// The contact problem of one solve.
+struct Problem {
+    /// Its samples by their distance, their contacts and forces, and `W` among them.
+    rows: Vec<(f32, usize)>,
+    contacts: Vec<Contact>,
+    solved: Vec<Vector>,
+    w: Vec<f32>,
+    sweeps: Sweeps,
+}
+
+impl Problem {
+    /// Room for [`MOST_ROWS`].
+    fn new() -> Result<Problem> {
+        let mut sweeps = Sweeps::default();
+        memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
+        Ok(Problem {
+            rows: memory::room(MOST_SAMPLES, WHAT)?,
+            contacts: memory::room(MOST_ROWS, WHAT)?,
+            solved: memory::room(MOST_ROWS, WHAT)?,
+            w: memory::room(9 * MOST_ROWS * MOST_ROWS, WHAT)?,
+            sweeps,
+        })
+    }
 }
 
 impl Solver {
@@ -55,18 +75,12 @@ impl Solver {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn new(modes: Modes) -> Result<Solver> {
-        let mut sweeps = Sweeps::default();
-        memory::tried(sweeps.reserve(MOST_ROWS), WHAT)?;
         Ok(Solver {
             modes,
             carried_s: 0.0,
             samples: Pushed::new()?,
             before: Pushed::new()?,
-            rows: memory::room(MOST_SAMPLES, WHAT)?,
-            contacts: memory::room(MOST_ROWS, WHAT)?,
-            solved: memory::room(MOST_ROWS, WHAT)?,
-            w: memory::room(9 * MOST_ROWS * MOST_ROWS, WHAT)?,
-            sweeps,
+            problem: Problem::new()?,
             stiffness: Stiffness::new()?,
             nearest: f32::MAX,
             slid: false,
@@ -163,7 +177,7 @@ impl Solver {
     ) {
         let skin = SKIN_MM + body.motion(from, now);
         let (low, high) = body.bounds(now, skin.max(FADE_MM));
-        self.rows.clear();
+        self.problem.rows.clear();
         self.nearest = f32::MAX;
         for at in 0..snapshot.count {
             let pushed = self.samples.forces[at] != Vector::ZERO;
@@ -177,27 +191,28 @@ impl Solver {
             };
             self.nearest = self.nearest.min(distance);
             if pushed || held {
-                self.rows.push((f32::MIN, at));
+                self.problem.rows.push((f32::MIN, at));
             } else if distance <= skin {
-                self.rows.push((distance, at));
+                self.problem.rows.push((distance, at));
             }
         }
-        if self.rows.len() > MOST_ROWS {
-            self.rows
+        if self.problem.rows.len() > MOST_ROWS {
+            self.problem
+                .rows
                 .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            for row in MOST_ROWS..self.rows.len() {
-                let (_, at) = self.rows[row];
+            for row in MOST_ROWS..self.problem.rows.len() {
+                let (_, at) = self.problem.rows[row];
                 let force = std::mem::take(&mut self.samples.forces[at]);
                 self.samples.change(snapshot, at, -force, part);
             }
-            self.rows.truncate(MOST_ROWS);
-            self.rows.sort_unstable_by_key(|row| row.1);
+            self.problem.rows.truncate(MOST_ROWS);
+            self.problem.rows.sort_unstable_by_key(|row| row.1);
         }
-        let (n, all) = (self.rows.len(), 3 * snapshot.count);
-        self.contacts.clear();
-        self.solved.clear();
-        self.w.clear();
-        for &(_, at) in &self.rows {
+        let (n, all) = (self.problem.rows.len(), 3 * snapshot.count);
+        self.problem.contacts.clear();
+        self.problem.solved.clear();
+        self.problem.w.clear();
+        for &(_, at) in &self.problem.rows {
             let force = self.samples.forces[at];
             let error = snapshot.errors[at];
             let pair = Pair {
@@ -224,24 +239,24 @@ impl Solver {
                 Law::Touch { .. } if contact.gap < f32::MAX => contact.gap -= error.x,
                 Law::Touch { .. } => {}
             }
-            self.contacts.push(contact);
-            self.solved.push(force);
+            self.problem.contacts.push(contact);
+            self.problem.solved.push(force);
             for axis in 0..3 {
                 let row = &snapshot.delassus[(3 * at + axis) * all..][..all];
-                for &(_, other) in &self.rows {
+                for &(_, other) in &self.problem.rows {
                     let block = &row[3 * other..3 * other + 3];
-                    self.w.extend(block.iter().map(|w| part * w));
+                    self.problem.w.extend(block.iter().map(|w| part * w));
                 }
             }
         }
-        self.sweeps.solve(
-            &mut Whole::new(&self.w, n),
-            &self.contacts,
-            &mut self.solved,
+        self.problem.sweeps.solve(
+            &mut Whole::new(&self.problem.w, n),
+            &self.problem.contacts,
+            &mut self.problem.solved,
             LIMITS,
         );
-        for row in 0..self.rows.len() {
-            let ((_, at), force) = (self.rows[row], self.solved[row]);
+        for row in 0..self.problem.rows.len() {
+            let ((_, at), force) = (self.problem.rows[row], self.problem.solved[row]);
             let change = force - self.samples.forces[at];
             self.samples.forces[at] = force;
             self.samples.change(snapshot, at, change, part);
@@ -280,7 +295,7 @@ impl Solver {
 
     pub fn stiffness(&mut self, snapshot: &ContactSnapshot, about: Vector) -> [f32; 36] {
         self.stiffness.directions.clear();
-        for (&(_, at), contact) in self.rows.iter().zip(&self.contacts) {
+        for (&(_, at), contact) in self.problem.rows.iter().zip(&self.problem.contacts) {
             let force = self.samples.forces[at];
             if force == Vector::ZERO {
                 continue;

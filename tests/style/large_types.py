@@ -47,7 +47,6 @@ LARGER: dict[str, tuple[int, int]] = {
     "upt::Nodes": (12, 2),
     "upt::Published": (12, 8),
     "upt::Scene": (7, 64),
-    "upt::Solver": (12, 12),
     "upt::Stepped": (11, 0),
     "upt::UptEngine": (13, 15),
     "upt::UptModel": (12, 8),
