@@ -30,13 +30,7 @@ const MOST_PARTS: u32 = 8;
 
 /// A tool that a hand feels. Used from one thread, which waits for nothing: no lock, no allocation.
 pub struct Haptics {
-    body: Body,
-    friction: f32,
-    /// The force of a new step is blended in over this time, s; 0 for at once.
-    blend_s: f64,
-    /// Whether the damper gives back what the rendered spring makes of its own, up to `damping_limit`, N s/m.
-    passivity: bool,
-    damping_limit: f32,
+    tool: Felt,
     /// Largest force, mN; 0 for none. The torque is scaled with it.
     force_limit_mn: f32,
     /// The contact near the tool in the last published step, and the way back: where the hand is now.
@@ -45,15 +39,43 @@ pub struct Haptics {
     ends: Arc<Ends>,
     /// Time and pose of the last call.
     last: Option<(f64, Pose)>,
-    /// Number of the last snapshot, how old its state is by now, and how long ago it was seen, s.
-    seen: u64,
+    seen: Seen,
+    blend: Blend,
+    damper: Damper,
+    contact: Solver,
+}
+
+/// What of the tool touches.
+struct Felt {
+    body: Body,
+    friction: f32,
+}
+
+/// The last snapshot.
+#[derive(Default)]
+struct Seen {
+    number: u64,
+    /// How old its state is by now, s.
     age_s: f64,
+}
+
+/// How the force of a new step takes the place of the one before.
+struct Blend {
+    /// It is blended in over this time, s; 0 for at once.
+    over_s: f64,
+    /// How long ago the last snapshot was seen, s.
     since_s: f64,
     /// What the last call gave before the damper, and what of it is blended out; mN, mN mm.
     shown: [Vector; 2],
     offset: [Vector; 2],
+}
+
+/// Gives back what the rendered spring makes of its own.
+struct Damper {
+    is_on: bool,
+    /// Up to this damping, N s/m.
+    limit: f32,
     observer: Observer,
-    contact: Solver,
 }
 
 impl Haptics {
@@ -65,22 +87,27 @@ impl Haptics {
         ends: Arc<Ends>,
     ) -> Result<Haptics> {
         Ok(Haptics {
-            body: options.tool.body.clone(),
-            friction: options.tool.friction,
-            blend_s: options.blend_s,
-            passivity: options.passivity,
-            damping_limit: options.damping_limit_n_s_per_m,
+            tool: Felt {
+                body: options.tool.body.clone(),
+                friction: options.tool.friction,
+            },
             force_limit_mn: 1e3 * options.force_limit_n,
             snapshot,
             pose,
             ends,
             last: None,
-            seen: 0,
-            age_s: 0.0,
-            since_s: 0.0,
-            shown: [Vector::ZERO; 2],
-            offset: [Vector::ZERO; 2],
-            observer: Observer::default(),
+            seen: Seen::default(),
+            blend: Blend {
+                over_s: options.blend_s,
+                since_s: 0.0,
+                shown: [Vector::ZERO; 2],
+                offset: [Vector::ZERO; 2],
+            },
+            damper: Damper {
+                is_on: options.passivity,
+                limit: options.damping_limit_n_s_per_m,
+                observer: Observer::default(),
+            },
             contact: Solver::new(modes)?,
         })
     }
@@ -105,13 +132,13 @@ impl Haptics {
                 "the scene was destroyed, so there is no force; destroy this object too".into(),
             ));
         }
-        let put = self.body.motion(&from, &now) > PUT_MM;
+        let put = self.tool.body.motion(&from, &now) > PUT_MM;
         let from = if put { now } else { from };
         let passed = at.time_s - last_s;
         let seconds = passed.min(MOST_S);
         self.last = Some((at.time_s, now));
         self.pose.write(now);
-        self.observer.observe(&from, &now);
+        self.damper.observer.observe(&from, &now);
 
         // A new step: its forces belong to the pose at that step, from which the tool has gone on for the snapshot's age.
         let arrived = self.snapshot.update();
@@ -119,15 +146,15 @@ impl Haptics {
         let (mut before, mut time) = (from, seconds);
         if arrived {
             self.contact.begin(snapshot);
-            self.seen = snapshot.number;
-            self.age_s = snapshot.latency_s;
-            self.since_s = 0.0;
-            let moved = |pose: &Pose| self.body.motion(pose, &now) <= PUT_MM;
+            self.seen.number = snapshot.number;
+            self.seen.age_s = snapshot.latency_s;
+            self.blend.since_s = 0.0;
+            let moved = |pose: &Pose| self.tool.body.motion(pose, &now) <= PUT_MM;
             before = snapshot.pose.filter(moved).unwrap_or(now);
             time = snapshot.latency_s.min(MOST_S);
         } else {
-            self.age_s += passed;
-            self.since_s += seconds;
+            self.seen.age_s += passed;
+            self.blend.since_s += seconds;
         }
         self.follow(arrived, [&before, &now], time);
         let snapshot = self.snapshot.buffer();
@@ -135,21 +162,21 @@ impl Haptics {
         let contacts = self.contact.pushing(snapshot.count).count() as u32;
         // A force starts from none, and goes on from the one before.
         if arrived {
-            self.offset = [self.shown[0] - force, self.shown[1] - torque];
+            self.blend.offset = [self.blend.shown[0] - force, self.blend.shown[1] - torque];
         }
         // The difference from the last step's force fades out in time, and outside of the tissue in space.
         let near = match contacts > 0 {
             true => 1.0,
             false => 1.0 - self.contact.nearest.max(0.0) / FADE_MM,
         };
-        let late = match self.blend_s > 0.0 {
-            true => 1.0 - (self.since_s / self.blend_s) as f32,
+        let late = match self.blend.over_s > 0.0 {
+            true => 1.0 - (self.blend.since_s / self.blend.over_s) as f32,
             false => 0.0,
         };
         let part = near.max(0.0) * late.max(0.0);
         if part > 0.0 {
-            force += self.offset[0] * part;
-            torque += self.offset[1] * part;
+            force += self.blend.offset[0] * part;
+            torque += self.blend.offset[1] * part;
         }
         let size = force.length();
         if self.force_limit_mn > 0.0 && size > self.force_limit_mn {
@@ -158,17 +185,17 @@ impl Haptics {
                 torque * (self.force_limit_mn / size),
             );
         }
-        self.shown = [force, torque];
+        self.blend.shown = [force, torque];
         let (mut force_n, torque_n_m) = (force * 1e-3, torque * 1e-6);
         let mut damped = false;
-        if self.passivity && force_n != Vector::ZERO && seconds > 0.0 {
+        if self.damper.is_on && force_n != Vector::ZERO && seconds > 0.0 {
             let way = (now.translation - from.translation) * 1e-3 / seconds as f32;
             let velocity = at.velocity.map_or(way, |[linear, _]| Vector::from(linear));
-            let damping = self.observer.damping(velocity, self.damping_limit);
+            let damping = self.damper.observer.damping(velocity, self.damper.limit);
             force_n -= velocity * damping;
             damped = damping > 0.0;
         }
-        self.observer.hold(force_n, torque_n_m);
+        self.damper.observer.hold(force_n, torque_n_m);
         let stiffness = match contacts > 0 {
             true => self.contact.stiffness(snapshot, now.translation),
             false => [0.0; 36],
@@ -180,9 +207,9 @@ impl Haptics {
             contacts,
             contact: force_n != Vector::ZERO,
             damped,
-            age_s: self.age_s,
-            excess_energy_j: self.observer.excess(),
-            steps: self.seen,
+            age_s: self.seen.age_s,
+            excess_energy_j: self.damper.observer.excess(),
+            steps: self.seen.number,
         })
     }
 }
@@ -211,7 +238,7 @@ impl Haptics {
             }
             let share = self.contact.follow(snapshot, seconds.max(least) as f32);
             let way = [&from, &to];
-            (self.contact).solve(snapshot, &self.body, self.friction, way, share);
+            (self.contact).solve(snapshot, &self.tool.body, self.tool.friction, way, share);
             from = to;
         }
     }
