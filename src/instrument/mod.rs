@@ -94,16 +94,36 @@ pub struct InstrumentContacts {
     face_offsets: Vec<u32>,
     faces: Vec<[u32; 3]>,
     positions: Vec<f32>,
-    /// Instrument plus one that touched the node at the last call; 0: none.
-    touched_by: Vec<u8>,
+    touched: Touched,
+    /// Rows of `surface` that the search looks at closely, and their positions.
+    near: Vec<(u32, Vec3A)>,
+    found: Found,
+}
+
+/// What the last call left, by row of `surface`.
+#[derive(Debug)]
+struct Touched {
+    /// Instrument plus one that touched the node; 0: none.
+    by: Vec<u8>,
     /// Instrument plus one that let the node go, while it is near; 0: none.
     left: Vec<u8>,
     /// Place on a sticking instrument, in its frame.
     anchor: Vec<[f32; 3]>,
-    /// Poses at the last call.
+    /// The instruments' poses.
     poses: Vec<Pose>,
-    /// Rows of `surface` that the search looks at closely, and their positions.
-    near: Vec<(u32, Vec3A)>,
+}
+
+impl Touched {
+    fn forget(&mut self) {
+        self.by.fill(0);
+        self.left.fill(0);
+        self.poses.clear();
+    }
+}
+
+/// Nodes in contact, ascending, and their prescribed displacement `[m,3]`, mm.
+#[derive(Debug)]
+struct Found {
     nodes: Vec<u32>,
     vectors: Vec<f32>,
 }
@@ -151,22 +171,24 @@ impl InstrumentContacts {
             face_offsets,
             faces,
             positions: memory::copied(positions, WHAT)?,
-            touched_by: memory::filled(count, 0, WHAT)?,
-            left: memory::filled(count, 0, WHAT)?,
-            anchor: memory::filled(count, [0.0; 3], WHAT)?,
-            poses: memory::room(MAX_TOOLS, WHAT)?,
+            touched: Touched {
+                by: memory::filled(count, 0, WHAT)?,
+                left: memory::filled(count, 0, WHAT)?,
+                anchor: memory::filled(count, [0.0; 3], WHAT)?,
+                poses: memory::room(MAX_TOOLS, WHAT)?,
+            },
             near: memory::room(count, WHAT)?,
-            nodes: memory::room(count, WHAT)?,
-            vectors: memory::room(3 * count, WHAT)?,
+            found: Found {
+                nodes: memory::room(count, WHAT)?,
+                vectors: memory::room(3 * count, WHAT)?,
+            },
             surface,
         })
     }
 
     /// Forgets what is touched; the next call sees the instruments for the first time.
     pub fn reset(&mut self) {
-        self.touched_by.fill(0);
-        self.left.fill(0);
-        self.poses.clear();
+        self.touched.forget();
     }
 
     /// Finds the contacts of instruments with the tissue at `displacement [K,3]`, mm. The list's
@@ -197,11 +219,11 @@ impl InstrumentContacts {
             )));
         }
         let placed = instruments;
-        if self.poses.len() != instruments.len() {
+        if self.touched.poses.len() != instruments.len() {
             self.reset();
         }
-        self.nodes.clear();
-        self.vectors.clear();
+        self.found.nodes.clear();
+        self.found.vectors.clear();
         let mut low = Vector::splat(f32::INFINITY);
         let mut high = Vector::splat(f32::NEG_INFINITY);
         for instrument in placed {
@@ -213,35 +235,35 @@ impl InstrumentContacts {
             let (i, p) = self.near[candidate];
             let i = i as usize;
             let node = self.surface[i];
-            let before = std::mem::replace(&mut self.touched_by[i], 0);
+            let before = std::mem::replace(&mut self.touched.by[i], 0);
             let point = Vector::from(p);
             let target = match self.holder(point, before, placed) {
                 Some((by, instrument)) => {
                     let kept = self.keep(i, by, point, instrument);
                     if kept.is_none() {
-                        self.left[i] = before;
+                        self.touched.left[i] = before;
                     }
                     kept.map(|to| (by, to))
                 }
                 None => self.touch(i, point, displacement, placed, before),
             };
             if let Some((by, target)) = target {
-                self.touched_by[i] = by as u8 + 1;
-                self.left[i] = 0;
-                self.nodes.push(node);
+                self.touched.by[i] = by as u8 + 1;
+                self.touched.left[i] = 0;
+                self.found.nodes.push(node);
                 let c = target - Vector::from(self.rest[i]);
-                self.vectors.extend([c.x, c.y, c.z]);
+                self.found.vectors.extend([c.x, c.y, c.z]);
             }
         }
-        self.poses.clear();
+        self.touched.poses.clear();
         let poses = placed.iter().map(|instrument| instrument.tool.pose);
-        self.poses.extend(poses);
-        Ok((&self.nodes, &self.vectors))
+        self.touched.poses.extend(poses);
+        Ok((&self.found.nodes, &self.found.vectors))
     }
 
     /// What the last call found.
     pub fn found(&self) -> (&[u32], &[f32]) {
-        (&self.nodes, &self.vectors)
+        (&self.found.nodes, &self.found.vectors)
     }
 
     /// Collects the nodes in a box, and those that were touched, with their positions: nearly all of a search's time.
@@ -249,8 +271,8 @@ impl InstrumentContacts {
     fn sift(&mut self, displacement: &[f32], low: Vec3A, high: Vec3A) {
         self.near.clear();
         let away = Vec3A::splat(SKIN_MM);
-        let nodes = self.surface.iter().zip(&self.rest).zip(&self.touched_by);
-        let nodes = nodes.zip(&mut self.left);
+        let nodes = self.surface.iter().zip(&self.rest).zip(&self.touched.by);
+        let nodes = nodes.zip(&mut self.touched.left);
         for (i, (((&node, &rest), &touched), left)) in nodes.enumerate() {
             let at = 3 * node as usize;
             // A load of four where there is a fourth number.
@@ -283,7 +305,7 @@ impl InstrumentContacts {
 
     /// How instrument `by` has moved since the last call at a point that it is at now, mm; none at its first.
     fn motion(&self, by: usize, point: Vector, instrument: &Instrument) -> Option<Vector> {
-        let from = self.poses.get(by)?;
+        let from = self.touched.poses.get(by)?;
         Some(point - from.transform_point(instrument.to_local(point)))
     }
 
@@ -291,7 +313,7 @@ impl InstrumentContacts {
     fn keep(&self, i: usize, by: usize, point: Vector, instrument: &Instrument) -> Option<Vector> {
         let rest = Vector::from(self.rest[i]);
         let target = match instrument.sticking {
-            true => instrument.to_world(Vector::from(self.anchor[i])),
+            true => instrument.to_world(Vector::from(self.touched.anchor[i])),
             false => {
                 let nearest = instrument.nearest(point);
                 let moved = self.motion(by, point, instrument).unwrap_or_default();
@@ -327,7 +349,7 @@ impl InstrumentContacts {
             let outward = *normal.get_or_insert_with(|| self.outward(i, moved));
             let nearest = instrument.nearest(point);
             // One that was let go must come some way in before it is touched again.
-            let shallow = match usize::from(self.left[i]) == by + 1 {
+            let shallow = match usize::from(self.touched.left[i]) == by + 1 {
                 true => -HYSTERESIS_MM,
                 false => 0.0,
             };
@@ -358,7 +380,7 @@ impl InstrumentContacts {
             deepest = Some((nearest.distance, by, target));
         }
         let (_, by, target) = deepest?;
-        self.anchor[i] = placed[by].to_local(target).to_array();
+        self.touched.anchor[i] = placed[by].to_local(target).to_array();
         Some((by, target))
     }
 
