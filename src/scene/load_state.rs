@@ -19,20 +19,26 @@ pub struct LoadState {
     /// Of the last published state, and of the one being made.
     pub(super) last: Acting,
     pub(super) next: Acting,
-    /// What pressure may act on.
-    pressed: Pressed,
-    /// Triangles under pressure in either, and the pressure there.
-    faces: Vec<[u32; 3]>,
-    pascal: [Vec<f32>; 2],
-    /// Nodes of a region, and boundary triangles of the domain.
-    marked: Vec<bool>,
-    is_domain: Vec<bool>,
+    pressure: Pressure,
     forces: NodeForces,
     /// Mean of the nodes at rest.
     middle: [f32; 3],
     /// What holds the body in the step being made; none where that is what the bundle holds, at rest.
     pub(super) held: Option<Box<Held>>,
     moved: Moved,
+}
+
+/// Where pressure acts.
+#[derive(HeldBytes)]
+struct Pressure {
+    /// What it may act on.
+    pressed: Pressed,
+    /// Triangles under pressure in the last published state or the one being made, and the pressure there in each.
+    faces: Vec<[u32; 3]>,
+    pascal: [Vec<f32>; 2],
+    /// Nodes of a region, and boundary triangles of the domain.
+    marked: Vec<bool>,
+    is_domain: Vec<bool>,
 }
 
 impl LoadState {
@@ -61,11 +67,13 @@ impl LoadState {
             moved: Moved::default(),
             last: Acting::zeros(mesh)?,
             next: Acting::zeros(mesh)?,
-            faces: numbers().and(memory::room(most, WHAT))?,
-            pascal: [numbers()?, numbers()?],
-            pressed,
-            marked: memory::filled(count, false, WHAT)?,
-            is_domain: memory::collected(faces, is_domain, WHAT)?,
+            pressure: Pressure {
+                faces: numbers().and(memory::room(most, WHAT))?,
+                pascal: [numbers()?, numbers()?],
+                pressed,
+                marked: memory::filled(count, false, WHAT)?,
+                is_domain: memory::collected(faces, is_domain, WHAT)?,
+            },
         })
     }
 
@@ -173,15 +181,15 @@ impl LoadState {
         next.pascal.fill(0.0);
         let faces = mesh.surface_faces.as_chunks::<3>().0;
         for (index, pressure) in loads.pressures.iter().enumerate() {
-            self.marked.fill(false);
-            let (nodes, marked) = (pressure.nodes, &mut self.marked);
+            self.pressure.marked.fill(false);
+            let (nodes, marked) = (pressure.nodes, &mut self.pressure.marked);
             nodes
                 .iter()
                 .for_each(|node| marked[forces.parent(*node as usize)] = true);
             let mut is_on_none = true;
             for (row, (face, pascal)) in faces.iter().zip(&mut next.pascal).enumerate() {
                 let is_in = match nodes.is_empty() {
-                    true => self.is_domain[row],
+                    true => self.pressure.is_domain[row],
                     false => face.iter().all(|node| marked[*node as usize]),
                 };
                 if is_in {
@@ -200,13 +208,13 @@ impl LoadState {
             }
         }
         // Faces under pressure at either end of the step: pressure changes linearly over it.
-        self.faces.clear();
-        self.pascal.iter_mut().for_each(Vec::clear);
-        for (row, corners) in &self.pressed.triangles {
+        self.pressure.faces.clear();
+        self.pressure.pascal.iter_mut().for_each(Vec::clear);
+        for (row, corners) in &self.pressure.pressed.triangles {
             let both = [&self.last, &*next].map(|acting| acting.pascal[*row as usize]);
             if both != [0.0; 2] {
-                self.faces.push(*corners);
-                for (list, pascal) in self.pascal.iter_mut().zip(both) {
+                self.pressure.faces.push(*corners);
+                for (list, pascal) in self.pressure.pascal.iter_mut().zip(both) {
                     list.push(pascal);
                 }
             }
@@ -234,9 +242,9 @@ impl LoadState {
         self.acts().then(|| Load {
             dead: [&self.last.dead, &self.next.dead],
             gravity: [self.last.gravity, self.next.gravity],
-            faces: &self.faces,
-            points: &self.pressed.points,
-            pascal: [&self.pascal[0], &self.pascal[1]],
+            faces: &self.pressure.faces,
+            points: &self.pressure.pressed.points,
+            pascal: [&self.pressure.pascal[0], &self.pressure.pascal[1]],
             way: [0.0, 1.0],
         })
     }

@@ -40,7 +40,6 @@ LARGER: dict[str, tuple[int, int]] = {
     "upt::Between": (18, 5),
     "upt::ContactSnapshot": (18, 1),
     "upt::Counters": (11, 0),
-    "upt::LoadState": (12, 9),
     "upt::Model": (18, 20),
     "upt::Nodes": (12, 2),
     "upt::Published": (12, 8),
