@@ -41,7 +41,6 @@ LARGER: dict[str, tuple[int, int]] = {
     "upt::ContactSnapshot": (18, 1),
     "upt::Counters": (11, 0),
     "upt::Model": (18, 20),
-    "upt::Nodes": (12, 2),
     "upt::Published": (12, 8),
     "upt::Scene": (7, 64),
     "upt::Stepped": (11, 0),

@@ -26,7 +26,18 @@ pub(super) struct Nodes {
     /// Nodes in contact in the step, and the forces on them, mN `[m,3]`.
     pub then: Vec<u32>,
     pub forces: Vec<f32>,
-    /// Columns of both, ascending, and whether a node is in contact now.
+    coupled: Coupled,
+    kept: Kept,
+    /// Of all columns and of those in contact now.
+    pub dofs: Vec<u32>,
+    /// The change of the force on each of `dofs` since the step, mN.
+    pub change: Vec<f32>,
+}
+
+/// The columns of nodes that are in contact now or were in the step, and how they move each other.
+#[derive(Default, HeldBytes)]
+struct Coupled {
+    /// Ascending, and whether a node is in contact now.
     columns: Vec<(u32, bool)>,
     /// The columns alone.
     only: Vec<u32>,
@@ -34,14 +45,15 @@ pub(super) struct Nodes {
     upper: Vec<f64>,
     /// Scratch of what is read of the bundle's tables.
     widened: Vec<f32>,
-    /// Of the columns in contact now.
+}
+
+/// Those in contact now, whose forces are solved for.
+#[derive(Default, HeldBytes)]
+struct Kept {
+    /// Among [`Nodes::dofs`].
+    places: Vec<u32>,
     factor: ContactFactor,
-    /// Of all columns and of those in contact now.
-    pub dofs: Vec<u32>,
-    /// The change of the force on each of `dofs` since the step, mN.
-    pub change: Vec<f32>,
-    /// Places among `dofs` of those in contact now; how far each has to go beyond what the released forces do, mm; and the forces that take them there, mN.
-    held: Vec<u32>,
+    /// How far each has to go beyond what the released forces do, mm, and the forces that take them there, mN.
     wanted: Vec<f32>,
     solved: Vec<f32>,
 }
@@ -89,35 +101,55 @@ impl Nodes {
         };
         // All room is asked for before anything is written that lasts.
         let most = now.len() + self.then.len();
-        self.columns.clear();
-        memory::fit(&mut self.columns, most, WHAT)?;
-        for list in [&mut self.only, &mut self.dofs, &mut self.held] {
+        self.coupled.columns.clear();
+        memory::fit(&mut self.coupled.columns, most, WHAT)?;
+        for list in [
+            &mut self.coupled.only,
+            &mut self.dofs,
+            &mut self.kept.places,
+        ] {
             list.clear();
             memory::fit(list, 3 * most, WHAT)?;
         }
-        for list in [&mut self.change, &mut self.wanted, &mut self.solved] {
+        for list in [
+            &mut self.change,
+            &mut self.kept.wanted,
+            &mut self.kept.solved,
+        ] {
             list.clear();
             memory::fit(list, 3 * most, WHAT)?;
         }
-        memory::fit(&mut self.widened, 6 * means.prior.widest_block(), WHAT)?;
+        memory::fit(
+            &mut self.coupled.widened,
+            6 * means.prior.widest_block(),
+            WHAT,
+        )?;
         let there = now.nodes.iter().filter_map(|&node| own(node));
-        self.columns.extend(there.map(|column| (column, true)));
+        self.coupled
+            .columns
+            .extend(there.map(|column| (column, true)));
         for &node in &self.then {
             if now.at(node).is_none()
                 && let Some(column) = own(node)
             {
-                self.columns.push((column, false));
+                self.coupled.columns.push((column, false));
             }
         }
-        self.columns.sort_unstable();
-        self.only.extend(self.columns.iter().map(|column| column.0));
-        let order = 3 * self.only.len();
-        memory::fit(&mut self.upper, order * order, WHAT)?;
-        self.upper.clear();
-        self.upper.resize(order * order, 0.0);
+        self.coupled.columns.sort_unstable();
+        self.coupled
+            .only
+            .extend(self.coupled.columns.iter().map(|column| column.0));
+        let order = 3 * self.coupled.only.len();
+        memory::fit(&mut self.coupled.upper, order * order, WHAT)?;
+        self.coupled.upper.clear();
+        self.coupled.upper.resize(order * order, 0.0);
         let prior = means.prior;
-        prior.gather_compliance(&self.only, &mut self.upper, &mut self.widened);
-        for column in &self.only {
+        prior.gather_compliance(
+            &self.coupled.only,
+            &mut self.coupled.upper,
+            &mut self.coupled.widened,
+        );
+        for column in &self.coupled.only {
             self.dofs.extend([0, 1, 2].map(|axis| 3 * column + axis));
         }
         for i in 0..order {
@@ -127,12 +159,12 @@ impl Nodes {
                 let pairs = means.inertial_compliance.iter().zip(own).zip(other);
                 // `A_k = A - N diag(lost) N^T`: within the frame's time inertia holds back what the slow modes would do.
                 let lost: f32 = pairs.map(|((lost, a), b)| lost * a * b).sum();
-                self.upper[i * order + j] -= f64::from(lost);
+                self.coupled.upper[i * order + j] -= f64::from(lost);
             }
         }
         // What the released nodes were pushed with is taken back, ...
         self.change.resize(order, 0.0);
-        for (at, &(column, stays)) in self.columns.iter().enumerate() {
+        for (at, &(column, stays)) in self.coupled.columns.iter().enumerate() {
             let node = prior.contact_nodes[column as usize];
             if !stays && let Ok(row) = self.then.binary_search(&node) {
                 let force = &self.forces[3 * row..3 * row + 3];
@@ -142,30 +174,32 @@ impl Nodes {
             }
         }
         // ... and the others are pushed to their places.
-        let stays = |at: &usize| self.columns[at / 3].1;
-        self.held
+        let stays = |at: &usize| self.coupled.columns[at / 3].1;
+        self.kept
+            .places
             .extend((0..order).filter(stays).map(|at| at as u32));
-        let upper = &self.upper;
+        let upper = &self.coupled.upper;
         let between = |i: usize, j: usize| upper[i.min(j) * order + i.max(j)];
-        for &at in &self.held {
+        for &at in &self.kept.places {
             let at = at as usize;
-            let node = prior.contact_nodes[self.only[at / 3] as usize];
+            let node = prior.contact_nodes[self.coupled.only[at / 3] as usize];
             let place = free[3 * node as usize + at % 3];
             let wanted = now.at(node).map_or(place, |to| to[at % 3]);
-            let released = (0..order).filter(|other| !self.columns[other / 3].1);
+            let released = (0..order).filter(|other| !self.coupled.columns[other / 3].1);
             let moved: f64 = released
                 .map(|other| between(at, other) * f64::from(self.change[other]))
                 .sum();
-            self.wanted.push(wanted - place - moved as f32);
+            self.kept.wanted.push(wanted - place - moved as f32);
         }
         // With nothing in contact any more the released forces are all there is.
-        let count = self.held.len();
+        let count = self.kept.places.len();
         if count == 0 {
             return Ok(());
         }
-        self.factor.reserve(count)?;
-        let held = &self.held;
-        self.factor
+        self.kept.factor.reserve(count)?;
+        let held = &self.kept.places;
+        self.kept
+            .factor
             .factor(means.isa, held, |out| {
                 for (i, &row) in held.iter().enumerate() {
                     for (j, &column) in held.iter().enumerate().skip(i) {
@@ -174,9 +208,11 @@ impl Nodes {
                 }
             })
             .map_err(|error| Error::bundle("prior.safetensors", error.to_string()))?;
-        self.solved.resize(count, 0.0);
-        self.factor.solve(means.isa, &self.wanted, &mut self.solved);
-        for (&at, &force) in self.held.iter().zip(&self.solved) {
+        self.kept.solved.resize(count, 0.0);
+        self.kept
+            .factor
+            .solve(means.isa, &self.kept.wanted, &mut self.kept.solved);
+        for (&at, &force) in self.kept.places.iter().zip(&self.kept.solved) {
             self.change[at as usize] = force;
         }
         Ok(())
