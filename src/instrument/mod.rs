@@ -16,10 +16,14 @@
 //! Every surface node is looked at, from where it is now, so large displacements need no care:
 //! a bounding-box test a node, and the exact query for the few that pass. Lengths in mm.
 
+mod touched;
+
 use crate::contact::{MAX_TOOLS, Tool};
 use crate::error::{Error, Result};
 use crate::memory;
-use parry3d::math::{Pose, Vec3A, Vec4, Vector};
+use parry3d::math::{Vec3A, Vec4, Vector};
+
+use touched::Touched;
 
 /// How far outside an instrument that does not move a node that was touched still follows it, mm.
 pub const SKIN_MM: f32 = 0.5;
@@ -98,27 +102,6 @@ pub struct InstrumentContacts {
     /// Rows of `surface` that the search looks at closely, and their positions.
     near: Vec<(u32, Vec3A)>,
     found: Found,
-}
-
-/// What the last call left, by row of `surface`.
-#[derive(Debug)]
-struct Touched {
-    /// Instrument plus one that touched the node; 0: none.
-    by: Vec<u8>,
-    /// Instrument plus one that let the node go, while it is near; 0: none.
-    left: Vec<u8>,
-    /// Place on a sticking instrument, in its frame.
-    anchor: Vec<[f32; 3]>,
-    /// The instruments' poses.
-    poses: Vec<Pose>,
-}
-
-impl Touched {
-    fn forget(&mut self) {
-        self.by.fill(0);
-        self.left.fill(0);
-        self.poses.clear();
-    }
 }
 
 /// Nodes in contact, ascending, and their prescribed displacement `[m,3]`, mm.
