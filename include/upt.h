@@ -415,7 +415,11 @@ UPT_ENUM(upt_view_kind, int32_t) {
   /**
    * The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.
    */
-  UPT_VIEW_SURFACE = 2
+  UPT_VIEW_SURFACE = 2,
+  /**
+   * The view's own `nodes`, in the region or not. Only `upt_scene_decode` takes it.
+   */
+  UPT_VIEW_NODES = 3
 };
 
 /**
@@ -1080,6 +1084,28 @@ typedef struct upt_input {
 } upt_input;
 
 /**
+ * What is shown of a state. Where a call takes one, NULL is the region.
+ */
+typedef struct upt_view {
+  /**
+   * `sizeof(upt_view)`.
+   */
+  uint32_t struct_size;
+  /**
+   * `UPT_VIEW_*`.
+   */
+  upt_view_kind kind;
+  /**
+   * `[node_count]`, only with `UPT_VIEW_NODES`: indices, in the order of the output; NULL with count 0: all nodes.
+   */
+  const uint32_t *nodes;
+  /**
+   * At most K.
+   */
+  uint64_t node_count;
+} upt_view;
+
+/**
  * What the tissue does to an instrument at the end of a step; filled by `upt_scene_read_instruments`.
  */
 typedef struct upt_instrument_reading {
@@ -1317,20 +1343,6 @@ typedef struct upt_surface {
    */
   uint64_t changed_count;
 } upt_surface;
-
-/**
- * What is shown of a state. Where a call takes one, NULL is the region.
- */
-typedef struct upt_view {
-  /**
-   * `sizeof(upt_view)`.
-   */
-  uint32_t struct_size;
-  /**
-   * `UPT_VIEW_*`.
-   */
-  upt_view_kind kind;
-} upt_view;
 
 /**
  * Options of `upt_haptics_create`.
@@ -1927,13 +1939,16 @@ upt_status upt_scene_step_field(struct upt_scene *scene,
 /**
  * Copies the last published state.
  *
- * - `out`: `[n,3]`, mm, in the region's order (all nodes when there is none).
+ * - `view`: the region (all nodes where there is none), or the attached points; NULL: the region.
+ * - `out`: `[n,3]`, mm, in the view's order.
  * - `out_count`: number of floats in `out`, 3 n.
  *
  * Threads: any, at any time, even while a step runs.
- * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+ * Errors: `UPT_ERR_STATE` for the points when none are attached, `UPT_ERR_UNSUPPORTED` for another view,
+ * `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
  */
 upt_status upt_scene_read(struct upt_scene *scene,
+                          const struct upt_view *view,
                           float *out,
                           uint64_t out_count);
 
@@ -1979,14 +1994,16 @@ upt_status upt_scene_wait(struct upt_scene *scene,
  * Interpolates between the last two states, for frames between steps. Works while a step is in flight.
  *
  * - `alpha`: 0 is the state before, 1 the last state; values from 0 to 1.
- * - `out`: `[n,3]`, mm, in the region's order.
+ * - `view`: as in `upt_scene_read`.
+ * - `out`: `[n,3]`, mm, in the view's order.
  * - `out_count`: number of floats in `out`, 3 n.
  *
  * Threads: any, at any time, even while a step runs.
- * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+ * Errors: as `upt_scene_read`, and `UPT_ERR_NON_FINITE`.
  */
 upt_status upt_scene_sample(struct upt_scene *scene,
                             double alpha,
+                            const struct upt_view *view,
                             float *out,
                             uint64_t out_count);
 
@@ -2005,24 +2022,23 @@ upt_status upt_scene_set_region(struct upt_scene *scene,
                                 uint64_t count);
 
 /**
- * Decodes any nodes of the last state, in the region or not.
+ * Computes any nodes of the last state, in the region or not.
  *
- * - `nodes`: `[n]` indices, n at most K.
- * - `out`: `[n,3]`, mm.
+ * - `view`: of kind `UPT_VIEW_NODES` its nodes; others as in `upt_scene_read`.
+ * - `out`: `[n,3]`, mm, in the view's order.
  * - `out_count`: number of floats in `out`, 3 n.
  *
  * Threads: one at a time.
- * Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_STATE` before the first step,
- * `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+ * Errors: `UPT_ERR_BUSY`, `UPT_ERR_STATE` for nodes before the first step, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, and as
+ * `upt_scene_read`.
  */
 upt_status upt_scene_decode(struct upt_scene *scene,
-                            const uint32_t *nodes,
-                            uint64_t count,
+                            const struct upt_view *view,
                             float *out,
                             uint64_t out_count);
 
 /**
- * Attaches points to the tissue. They replace those attached before. A bundle of kind `upt` decodes each point in every
+ * Attaches points to the tissue, which views of kind `UPT_VIEW_POINTS` show. They replace those attached before. A bundle of kind `upt` decodes each point in every
  * step (unless the scene has `interpolate_points`); one of kind `reduced` interpolates between nodes.
  *
  * - `points`: `[n,3]`, rest positions, mm; NULL with count 0 detaches.
@@ -2035,35 +2051,6 @@ upt_status upt_scene_decode(struct upt_scene *scene,
 upt_status upt_scene_attach_points(struct upt_scene *scene,
                                    const float *points,
                                    uint64_t count);
-
-/**
- * Copies the displacement of the attached points in the last state.
- *
- * - `out`: `[n,3]`, mm.
- * - `out_count`: number of floats in `out`, 3 n.
- *
- * Threads: any, at any time, even while a step runs.
- * Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
- * `UPT_ERR_PANIC`.
- */
-upt_status upt_scene_read_points(struct upt_scene *scene,
-                                 float *out,
-                                 uint64_t out_count);
-
-/**
- * As `upt_scene_sample`, at the attached points.
- *
- * - `alpha`: 0 is the state before, 1 the last state.
- * - `out`: `[n,3]`, mm.
- * - `out_count`: number of floats in `out`, 3 n.
- *
- * Threads: any, at any time, even while a step runs.
- * Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
- */
-upt_status upt_scene_sample_points(struct upt_scene *scene,
-                                   double alpha,
-                                   float *out,
-                                   uint64_t out_count);
 
 /**
  * Copies the force, torque and penetration of each instrument at the end of the last step.

@@ -166,6 +166,13 @@ inline upt_view view(upt_view_kind kind) noexcept {
   made.kind = kind;
   return made;
 }
+/// These nodes, for `Scene::decode`; they must live until the call returns. Without any: all nodes.
+inline upt_view view(span<const std::uint32_t> nodes) noexcept {
+  upt_view made = view(UPT_VIEW_NODES);
+  made.nodes = nodes.empty() ? nullptr : nodes.data();
+  made.node_count = nodes.size();
+  return made;
+}
 
 /// The input of a step or a frame: what drives it; nothing, where it is made without arguments.
 /// What it is made of is not copied: it must live until the call that takes the input returns.
@@ -540,9 +547,9 @@ public:
     return check(upt_scene_step_field(handle_, displacement.data(), collision.data(), out.data(),
                                       out.size()));
   }
-  /// The last published state; out: [n,3], mm, in the region's order. Any thread may call it.
-  upt_status read(span<float> out) {
-    return check(upt_scene_read(handle_, out.data(), out.size()));
+  /// The last published state; out: [n,3], mm, in the view's order. Any thread may call it.
+  upt_status read(span<float> out, const upt_view &shown = view(UPT_VIEW_REGION)) {
+    return check(upt_scene_read(handle_, &shown, out.data(), out.size()));
   }
 
   /// As `step`, on the scene's worker; the input is copied.
@@ -556,9 +563,9 @@ public:
   upt_status poll() { return check(upt_scene_poll(handle_)); }
   /// As `poll`, but waits for the step; UPT_PENDING when the time is up.
   upt_status wait(std::uint32_t timeout_ms) { return check(upt_scene_wait(handle_, timeout_ms)); }
-  /// Between the last two states, alpha from 0 to 1; out: [n,3], mm. Any thread may call it.
-  upt_status sample(double alpha, span<float> out) {
-    return check(upt_scene_sample(handle_, alpha, out.data(), out.size()));
+  /// Between the last two states, alpha from 0 to 1; otherwise as `read`.
+  upt_status sample(double alpha, span<float> out, const upt_view &shown = view(UPT_VIEW_REGION)) {
+    return check(upt_scene_sample(handle_, alpha, &shown, out.data(), out.size()));
   }
 
   /// A step computes these nodes alone, in this order, which makes it cheaper; empty: all nodes.
@@ -566,25 +573,18 @@ public:
     return check(
         upt_scene_set_region(handle_, nodes.empty() ? nullptr : nodes.data(), nodes.size()));
   }
-  /// Displacements of any nodes in the last state, decoded now; out: [nodes,3], mm.
-  upt_status decode(span<const std::uint32_t> nodes, span<float> out) {
-    return check(upt_scene_decode(handle_, nodes.data(), nodes.size(), out.data(), out.size()));
+  /// Any nodes in the last state, computed now: `decode(upt::view(nodes), out)`; out: [n,3], mm.
+  upt_status decode(const upt_view &shown, span<float> out) {
+    return check(upt_scene_decode(handle_, &shown, out.data(), out.size()));
   }
-  /// Points in the tissue at rest that steps carry along: [n,3], mm; empty detaches.
+  /// Points in the tissue at rest that steps carry along, for views of kind UPT_VIEW_POINTS: [n,3],
+  /// mm; empty detaches.
   upt_status attach_points(span<const float> points) {
     if (points.size() % 3 != 0) {
       return detail::mismatch();
     }
     return check(upt_scene_attach_points(handle_, points.empty() ? nullptr : points.data(),
                                          points.size() / 3));
-  }
-  /// Displacements of the attached points in the last state; out: [n,3], mm.
-  upt_status read_points(span<float> out) {
-    return check(upt_scene_read_points(handle_, out.data(), out.size()));
-  }
-  /// As `read_points`, between the last two states, alpha from 0 to 1.
-  upt_status sample_points(double alpha, span<float> out) {
-    return check(upt_scene_sample_points(handle_, alpha, out.data(), out.size()));
   }
 
   /// The tissue at a moment between steps, with what drives it where it is then; `when` is on the
@@ -1109,7 +1109,7 @@ private:
       presents_ = false;
     }
     const double alpha = since(now) / dt_;
-    return upt_scene_sample(scene.get(), alpha < 1 ? alpha : 1, out.data(), out.size());
+    return upt_scene_sample(scene.get(), alpha < 1 ? alpha : 1, nullptr, out.data(), out.size());
   }
 
   // The instruments at a moment: on the line between two frames, as they were before the first.

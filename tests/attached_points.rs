@@ -48,7 +48,7 @@ fn attached_points_follow_the_tetrahedra_around_them() {
             assert_eq!(scene.point_count(), 5);
             rollout(&scene, 5);
             let mut at_points = vec![0.0; 15];
-            scene.read_points(&mut at_points).unwrap();
+            scene.read_view(upt::View::Points, &mut at_points).unwrap();
             let mut nodes = vec![0.0; 9];
             scene.decode(&[7, 150, 33], &mut nodes).unwrap();
             let at_nodes = largest_difference(&at_points[..9], &nodes);
@@ -69,7 +69,9 @@ fn attached_points_follow_the_tetrahedra_around_them() {
                 );
             }
             assert!(at_points.iter().all(|u| u.is_finite()));
-            scene.sample_points(0.5, &mut at_points).unwrap();
+            scene
+                .sample_view(upt::View::Points, 0.5, &mut at_points)
+                .unwrap();
             assert_eq!(
                 scene
                     .attach_points(Some(&[f32::NAN; 3]))
@@ -117,7 +119,7 @@ fn anchors_do_not_change_what_a_point_is_decoded_to() {
         scene.step(sparse(&contact), None).unwrap();
     }
     let mut at_points = vec![0.0; places.len()];
-    with.read_points(&mut at_points).unwrap();
+    with.read_view(upt::View::Points, &mut at_points).unwrap();
     let [mut interpolated, mut decoded] = [at_points.clone(), at_points.clone()];
     with.decode(&nodes, &mut interpolated).unwrap();
     without.decode(&nodes, &mut decoded).unwrap();
@@ -147,8 +149,8 @@ fn points_attached_late_are_where_they_would_have_been() {
         late.attach_points(Some(&middle)).unwrap();
         let (mut a, mut b) = (vec![0.0; 3], vec![0.0; 3]);
         for alpha in [0.0, 1.0] {
-            early.sample_points(alpha, &mut a).unwrap();
-            late.sample_points(alpha, &mut b).unwrap();
+            early.sample_view(upt::View::Points, alpha, &mut a).unwrap();
+            late.sample_view(upt::View::Points, alpha, &mut b).unwrap();
             assert_eq!(bits(&a), bits(&b), "{name} at {alpha}");
         }
         let portable = scene(
@@ -160,7 +162,7 @@ fn points_attached_late_are_where_they_would_have_been() {
         );
         portable.attach_points(Some(&middle)).unwrap();
         rollout(&portable, 5);
-        portable.read_points(&mut b).unwrap();
+        portable.read_view(upt::View::Points, &mut b).unwrap();
         assert!(largest_difference(&a, &b) < 1e-3, "{name}");
     }
 }
@@ -177,7 +179,7 @@ fn points_near_a_contact_follow_what_is_imposed() {
         scene.attach_points(Some(place)).unwrap();
         scene.step(sparse(&contact), None).unwrap();
         let mut at = vec![0.0; 3];
-        scene.read_points(&mut at).unwrap();
+        scene.read_view(upt::View::Points, &mut at).unwrap();
         assert!(
             largest_difference(&at, &contact.1[..3]) < 1e-4,
             "{name}: {at:?}"

@@ -74,11 +74,11 @@ fn every_call_of_a_host_that_traps_exceptions_returns() {
             );
             let mut forces = vec![0.0f32; 3 * nodes.len()];
             let read = trapped("upt_scene_read", || unsafe {
-                upt_scene_read(scene, out.as_mut_ptr(), floats)
+                upt_scene_read(scene, std::ptr::null(), out.as_mut_ptr(), floats)
             });
             let sample = trapped("upt_scene_sample", || unsafe {
-                upt_scene_sample(scene, f64::NAN, out.as_mut_ptr(), floats)
-                    + upt_scene_sample(scene, 0.3, out.as_mut_ptr(), floats)
+                upt_scene_sample(scene, f64::NAN, std::ptr::null(), out.as_mut_ptr(), floats)
+                    + upt_scene_sample(scene, 0.3, std::ptr::null(), out.as_mut_ptr(), floats)
             });
             assert_eq!((read, sample), (UPT_OK, UPT_ERR_NON_FINITE));
             if host::stats(scene).contact_count == nodes.len() as u64 {

@@ -89,6 +89,7 @@ const CONSTANTS: &[(&str, i64, i64)] = constants! {
     UPT_VIEW_REGION = 0,
     UPT_VIEW_POINTS = 1,
     UPT_VIEW_SURFACE = 2,
+    UPT_VIEW_NODES = 3,
     UPT_SHAPE_CAPSULE = 0,
     UPT_SHAPE_BOX = 1,
     UPT_SHAPE_SPATULA = 2,

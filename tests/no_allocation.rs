@@ -292,7 +292,7 @@ fn steps_allocate_nothing_and_keep_the_floating_point_mode() {
                     for contact in &pushes {
                         scene.step(sparse(contact), Some(&mut out)).unwrap();
                         scene.sample(0.3, &mut out).unwrap();
-                        scene.read_points(&mut at_points).unwrap();
+                        scene.read_view(upt::View::Points, &mut at_points).unwrap();
                         if scene.stats().prior_forces {
                             let forces = &mut forces[..contact.1.len()];
                             scene.contact_force(forces).unwrap();

@@ -64,7 +64,9 @@ fn calls_stay_within_the_stated_stack() {
                     );
                     let mut out = vec![0.0f32; 3 * host.nodes];
                     let floats = out.len() as u64;
-                    let read = unsafe { upt_scene_read(host.scene, out.as_mut_ptr(), floats) };
+                    let read = unsafe {
+                        upt_scene_read(host.scene, std::ptr::null(), out.as_mut_ptr(), floats)
+                    };
                     assert_eq!(read, UPT_OK);
                 }
             });

@@ -182,7 +182,7 @@ static void breathe(const std::string &bundle) {
 // Where the nodes of the first group are on the average, from rest.
 static Vec3 mean_of(upt::Scene &scene, const std::vector<std::uint32_t> &nodes) {
   std::vector<float> u(3 * nodes.size());
-  scene.decode(nodes, u);
+  scene.decode(upt::view(nodes), u);
   Vec3 mean{};
   for (std::size_t i = 0; i < nodes.size(); i++) {
     mean = mean + vertex(u, i) * (1.0F / static_cast<float>(nodes.size()));

@@ -64,7 +64,7 @@ class PushPoint(gymnasium.Env):
         self.scene.reset()
         for part in np.linspace(0.0, 1.0, 6):
             self._step(part * press)
-        self.goal = self.scene.read_points()[0].copy()
+        self.goal = self.scene.read(view="points")[0].copy()
         self.scene.reset()
         self.moved, self.time = np.zeros(3), 0
         return self._observe(), {}
@@ -88,7 +88,7 @@ class PushPoint(gymnasium.Env):
         self.scene.step([self.ball])
 
     def _point(self) -> np.ndarray:
-        return self.scene.read_points()[0] if self.time else np.zeros(3, np.float32)
+        return self.scene.read(view="points")[0] if self.time else np.zeros(3, np.float32)
 
     def _observe(self) -> np.ndarray:
         return np.concatenate([self._point(), self.goal, self.moved]).astype(np.float32)

@@ -85,13 +85,13 @@ def test_region_decode_and_points(model, scene):
     scene.set_region(chosen)
     assert scene.out_count == len(chosen)
     np.testing.assert_allclose(scene.step(contacts=(nodes, vectors)), whole[chosen], atol=1e-5)
-    assert scene.read_points().shape == (5, 3)
-    np.testing.assert_array_equal(scene.read_points(), scene.sample_points(1.0))
+    assert scene.read(view="points").shape == (5, 3)
+    np.testing.assert_array_equal(scene.read(view="points"), scene.sample(1.0, view="points"))
     scene.set_region(None)
     assert scene.read().shape == whole.shape
     scene.attach_points(None)
     with pytest.raises(upt.StateError, match="points"):
-        scene.read_points()
+        scene.read(view="points")
 
 
 def test_a_snapshot_resumes_to_the_bit(model, scene):

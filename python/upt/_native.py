@@ -239,6 +239,8 @@ class ViewKind(IntEnum):
     """The attached points."""
     SURFACE = 2
     """The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too."""
+    NODES = 3
+    """The view's own `nodes`, in the region or not. Only `upt_scene_decode` takes it."""
 
 
 class Shape(IntEnum):
@@ -1044,10 +1046,16 @@ class View(Record):
     """`sizeof(upt_view)`."""
     kind: ViewKind = choice("_kind", ViewKind)
     """`UPT_VIEW_*`."""
+    nodes: int | None
+    """`[node_count]`, only with `UPT_VIEW_NODES`: indices, in the order of the output; NULL with count 0: all nodes."""
+    node_count: int
+    """At most K."""
 
     _fields_ = [
         ("struct_size", ctypes.c_uint32),
         ("_kind", ctypes.c_int32),
+        ("nodes", ctypes.c_void_p),
+        ("node_count", ctypes.c_uint64),
     ]
 
 
@@ -1325,16 +1333,14 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "upt_scene_reset": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_step": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_step_field": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_read": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_read": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_submit": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p]),
     "upt_scene_poll": (ctypes.c_int32, [ctypes.c_void_p]),
     "upt_scene_wait": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint32]),
-    "upt_scene_sample": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_sample": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_set_region": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_decode": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64]),
+    "upt_scene_decode": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_attach_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_read_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
-    "upt_scene_sample_points": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_read_instruments": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64]),
     "upt_scene_read_instrument_contacts": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),
     "upt_hull_create": (ctypes.c_int32, [ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p]),

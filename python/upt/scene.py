@@ -188,10 +188,11 @@ class Scene(Cuts, Recorded, Ties):
         check(lib.upt_scene_read_contact_force(self._handle, place, length))
         return result
 
-    def read(self, out: Floats | None = None) -> Floats:
-        """The last published state `[n, 3]`, mm, in the region's order."""
-        result, place, length, _ = self._others.place(out, self._out_count)
-        check(lib.upt_scene_read(self._handle, place, length))
+    def read(self, out: Floats | None = None, *, view: ViewKind | str = ViewKind.REGION) -> Floats:
+        """The last published state `[n, 3]`, mm, in the view's order: the region, or the attached points ("points")."""
+        seen, count = self._seen(view)
+        result, place, length, _ = self._others.place(out, count)
+        check(lib.upt_scene_read(self._handle, ctypes.byref(seen), place, length))
         return result
 
     def submit(
@@ -220,10 +221,11 @@ class Scene(Cuts, Recorded, Ties):
         milliseconds = FOREVER_MS if seconds is None else int(min(max(seconds * 1000, 0), FOREVER_MS))
         return check(lib.upt_scene_wait(self._handle, milliseconds)) != Status.PENDING
 
-    def sample(self, alpha: float, out: Floats | None = None) -> Floats:
-        """Between the last two states (`alpha` 0: the one before, 1: the last): `[n, 3]`, mm, in the region's order."""
-        result, place, length, _ = self._others.place(out, self._out_count)
-        check(lib.upt_scene_sample(self._handle, number(alpha, "alpha"), place, length))
+    def sample(self, alpha: float, out: Floats | None = None, *, view: ViewKind | str = ViewKind.REGION) -> Floats:
+        """Between the last two states (`alpha` 0: the one before, 1: the last); otherwise as `read`."""
+        seen, count = self._seen(view)
+        result, place, length, _ = self._others.place(out, count)
+        check(lib.upt_scene_sample(self._handle, number(alpha, "alpha"), ctypes.byref(seen), place, length))
         return result
 
     def present(
@@ -256,15 +258,19 @@ class Scene(Cuts, Recorded, Ties):
             upt.StateError: the body has changed since its `surface` was asked for.
         """
         at, _, kept = self._inputs.place(instruments, contacts, None, None, 0.0)
-        seen = View(kind=view)
-        count, places = self._out_count, self._frames
-        if seen.kind == ViewKind.POINTS:
-            count, places = self._point_count, self._others
-        elif seen.kind == ViewKind.SURFACE:
-            count, places = self._vertex_count, self._others
+        seen, count = self._seen(view)
+        places = self._frames if seen.kind == ViewKind.REGION else self._others
         result, place, length, _ = places.place(out, count)
         check(lib.upt_scene_present(self._handle, at, number(when, "when"), ctypes.byref(seen), place, length))
         return result
+
+    def _seen(self, view: ViewKind | str) -> tuple[View, int]:
+        """A view of the scene's own, and how many rows it has."""
+        seen = View(kind=view)
+        if seen.kind == ViewKind.NODES:
+            raise ValueError("view: nodes are what `decode` takes")
+        counts = {ViewKind.POINTS: self._point_count, ViewKind.SURFACE: self._vertex_count}
+        return seen, counts.get(seen.kind, self._out_count)
 
     def set_region(self, nodes: ArrayLike | None) -> None:
         """Restricts what a step decodes and returns to these nodes `[n]`, in this order; None: all nodes."""
@@ -274,11 +280,12 @@ class Scene(Cuts, Recorded, Ties):
         check(lib.upt_scene_set_region(self._handle, address(chosen) if len(chosen) else None, len(chosen)))
         self._out_count = self._node_count if nodes is None else len(chosen)
 
-    def decode(self, nodes: ArrayLike, out: Floats | None = None) -> Floats:
-        """Displacement of any nodes `[n]` in the last state, whatever the region is: `[n, 3]`, mm."""
-        chosen = indices(nodes, "nodes")
-        result, place, length, _ = self._others.place(out, len(chosen))
-        check(lib.upt_scene_decode(self._handle, address(chosen), len(chosen), place, length))
+    def decode(self, nodes: ArrayLike | None, out: Floats | None = None) -> Floats:
+        """Displacement of any nodes `[n]` in the last state, whatever the region is: `[n, 3]`, mm; None: all nodes."""
+        chosen = indices(() if nodes is None else nodes, "nodes")
+        result, place, length, _ = self._others.place(out, self._node_count if nodes is None else len(chosen))
+        seen = View(kind=ViewKind.NODES, nodes=None if nodes is None else address(chosen), node_count=len(chosen))
+        check(lib.upt_scene_decode(self._handle, ctypes.byref(seen), place, length))
         return result
 
     def attach_points(self, points: ArrayLike | None) -> None:
@@ -286,18 +293,6 @@ class Scene(Cuts, Recorded, Ties):
         rest = vectors(np.empty((0, 3), np.float32) if points is None else points, "points")
         check(lib.upt_scene_attach_points(self._handle, address(rest) if len(rest) else None, len(rest)))
         self._point_count = len(rest)
-
-    def read_points(self, out: Floats | None = None) -> Floats:
-        """Displacement of the attached points in the last state: `[n, 3]`, mm."""
-        result, place, length, _ = self._others.place(out, self._point_count)
-        check(lib.upt_scene_read_points(self._handle, place, length))
-        return result
-
-    def sample_points(self, alpha: float, out: Floats | None = None) -> Floats:
-        """As `sample`, at the attached points."""
-        result, place, length, _ = self._others.place(out, self._point_count)
-        check(lib.upt_scene_sample_points(self._handle, number(alpha, "alpha"), place, length))
-        return result
 
     @property
     def stats(self) -> SceneStats:

@@ -161,6 +161,8 @@ pub const UPT_VIEW_REGION: upt_view_kind = 0;
 pub const UPT_VIEW_POINTS: upt_view_kind = 1;
 /// The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.
 pub const UPT_VIEW_SURFACE: upt_view_kind = 2;
+/// The view's own `nodes`, in the region or not. Only `upt_scene_decode` takes it.
+pub const UPT_VIEW_NODES: upt_view_kind = 3;
 
 /// Shape of an instrument.
 pub type upt_shape = i32;

@@ -14,7 +14,7 @@ use crate::contact::{MAX_TIES, MAX_TOOLS, Tool};
 use crate::features;
 use crate::scene::{
     Contact, GroupMotion, Lists, Loads, MAX_POINT_FORCES, MAX_PRESSURES, MAX_SUPPORTS, PointForce,
-    Pressure, Scene, StepInput, SupportPose, View,
+    Pressure, Scene, StepInput, SupportPose,
 };
 use ::contact::Tie;
 
@@ -257,21 +257,6 @@ pub(super) unsafe fn field<'a>(
     let floats = scene.mesh().positions.len() as u64;
     // SAFETY: the caller's.
     unsafe { slice(pointer, floats, name) }.map(Some)
-}
-
-/// What the host wants to see.
-///
-/// # Safety
-/// NULL, or a struct whose first field is its size.
-pub(super) unsafe fn read_view(raw: *const upt_view) -> Result<View, Failure> {
-    // SAFETY: the caller's.
-    let raw = unsafe { options(raw, "view") }?;
-    match raw.kind {
-        UPT_VIEW_REGION => Ok(View::Region),
-        UPT_VIEW_POINTS => Ok(View::Points),
-        UPT_VIEW_SURFACE => Ok(View::Surface),
-        value => convert::unknown("view.kind", value),
-    }
 }
 
 /// The host's instruments as tools.

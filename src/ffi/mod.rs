@@ -39,6 +39,7 @@ mod support_structs;
 mod surface;
 mod ties;
 mod trace;
+mod views;
 mod worker;
 
 #[cfg(feature = "fault")]

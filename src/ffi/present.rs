@@ -1,11 +1,12 @@
 //! `upt_scene`: frames between steps.
 
 use super::constants::*;
-use super::input::{read_input, read_view};
+use super::input::read_input;
 use super::output::output;
 use super::registry::call_scene;
 use super::step_structs::*;
 use super::structs::*;
+use super::views::kept_view;
 use crate::features;
 
 /// The tissue at a moment between steps, with the instruments where they are at that moment: frames without lag.
@@ -48,7 +49,7 @@ pub unsafe extern "C" fn upt_scene_present(
         // SAFETY: the host passes what the header asks for.
         let input = unsafe { read_input(scene, input, &mut lists, &mut arrays) }?;
         // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
-        let view = unsafe { read_view(view) }?;
+        let view = unsafe { kept_view(scene, view) }?;
         // SAFETY: the host passes room for that many elements, as the header asks.
         let out = unsafe { output(out, out_count, "out") }?;
         scene.present_to(input, when, view, out)?;

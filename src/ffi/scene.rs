@@ -5,8 +5,9 @@ use super::constants::*;
 use super::input::{field, read_input};
 use super::output::{apart, optional_output, output, place};
 use super::registry::{add_scene, call_scene, find_model, remove_scene};
-use super::step_structs::upt_input;
+use super::step_structs::{upt_input, upt_view};
 use super::structs::*;
+use super::views::kept_view;
 use super::{convert, pointers};
 use crate::scene::{
     Contact, GroupMotion, Loads, MAX_PRESSURES, MAX_SUPPORTS, Pressure, Scene, StepInput, View,
@@ -143,20 +144,25 @@ pub unsafe extern "C" fn upt_scene_step_field(
 
 /// Copies the last published state.
 ///
-/// - `out`: `[n,3]`, mm, in the region's order (all nodes when there is none).
+/// - `view`: the region (all nodes where there is none), or the attached points; NULL: the region.
+/// - `out`: `[n,3]`, mm, in the view's order.
 /// - `out_count`: number of floats in `out`, 3 n.
 ///
 /// Threads: any, at any time, even while a step runs.
-/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+/// Errors: `UPT_ERR_STATE` for the points when none are attached, `UPT_ERR_UNSUPPORTED` for another view,
+/// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_read(
     scene: *mut upt_scene,
+    view: *const upt_view,
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_read", scene, |scene| {
+        // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
+        let view = unsafe { kept_view(scene, view) }?;
         // SAFETY: the host passes room for that many elements, as the header asks.
-        scene.read_to(View::Region, unsafe { output(out, out_count, "out") }?)?;
+        scene.read_to(view, unsafe { output(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
 }

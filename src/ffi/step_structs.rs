@@ -239,20 +239,10 @@ pub struct upt_view {
     pub struct_size: u32,
     /// `UPT_VIEW_*`.
     pub kind: upt_view_kind,
-}
-
-/// For hosts in Rust.
-impl upt_view {
-    /// The attached points.
-    pub const POINTS: upt_view = upt_view {
-        struct_size: size_of::<upt_view>() as u32,
-        kind: super::constants::UPT_VIEW_POINTS,
-    };
-    /// The vertices of the surface.
-    pub const SURFACE: upt_view = upt_view {
-        struct_size: size_of::<upt_view>() as u32,
-        kind: super::constants::UPT_VIEW_SURFACE,
-    };
+    /// `[node_count]`, only with `UPT_VIEW_NODES`: indices, in the order of the output; NULL with count 0: all nodes.
+    pub nodes: *const u32,
+    /// At most K.
+    pub node_count: u64,
 }
 
 /// The convex hull of a tool's points. Immutable; any number of threads may use it at once.

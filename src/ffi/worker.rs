@@ -7,10 +7,10 @@ use super::failure::Answer;
 use super::input::read_input;
 use super::output::output;
 use super::registry::call_scene;
-use super::step_structs::upt_input;
+use super::step_structs::{upt_input, upt_view};
 use super::structs::*;
+use super::views::kept_view;
 use crate::Progress;
-use crate::scene::View;
 
 /// Starts a step on the scene's worker thread and returns at once. An error of an earlier step that was not reported yet
 /// is still reported.
@@ -65,22 +65,25 @@ pub unsafe extern "C" fn upt_scene_wait(scene: *mut upt_scene, timeout_ms: u32) 
 /// Interpolates between the last two states, for frames between steps. Works while a step is in flight.
 ///
 /// - `alpha`: 0 is the state before, 1 the last state; values from 0 to 1.
-/// - `out`: `[n,3]`, mm, in the region's order.
+/// - `view`: as in `upt_scene_read`.
+/// - `out`: `[n,3]`, mm, in the view's order.
 /// - `out_count`: number of floats in `out`, 3 n.
 ///
 /// Threads: any, at any time, even while a step runs.
-/// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+/// Errors: as `upt_scene_read`, and `UPT_ERR_NON_FINITE`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn upt_scene_sample(
     scene: *mut upt_scene,
     alpha: f64,
+    view: *const upt_view,
     out: *mut f32,
     out_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_sample", scene, |scene| {
+        // SAFETY: NULL, or a struct whose first field is its size, as the header asks.
+        let view = unsafe { kept_view(scene, view) }?;
         // SAFETY: the host passes room for that many elements, as the header asks.
-        let out = unsafe { output(out, out_count, "out") }?;
-        scene.sample_to(View::Region, alpha, out)?;
+        scene.sample_to(view, alpha, unsafe { output(out, out_count, "out") }?)?;
         Ok(UPT_OK)
     })
 }

@@ -54,7 +54,11 @@ impl Haptics {
         memory::fit(&mut self.decoded, floats, WHAT)?;
         self.decoded.resize(floats, 0.0);
         if !self.around.is_empty() {
-            core.decode(published, &self.around, self.decoded.as_mut_slice().into())?;
+            core.decode(
+                published,
+                Some(&self.around),
+                self.decoded.as_mut_slice().into(),
+            )?;
         }
         for (&node, u) in self.around.iter().zip(self.decoded.chunks_exact(3)) {
             self.field[3 * node as usize..][..3].copy_from_slice(u);

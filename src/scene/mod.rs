@@ -282,7 +282,7 @@ impl Scene {
     /// scene.attach_points(Some(corner))?;
     /// scene.step(Contact::None, None)?;
     /// let mut u = [0.0; 3];
-    /// scene.read_points(&mut u)?;
+    /// scene.read_view(upt::View::Points, &mut u)?;
     /// assert_eq!(scene.point_count(), 1);
     /// # upt::Result::Ok(())
     /// ```

@@ -23,9 +23,12 @@ impl Scene {
         lock_read(&self.shared.published).count(View::Points)
     }
 
-    /// Displacement `[n,3]` at the attached points in the last state.
-    pub fn read_points(&self, out: &mut [f32]) -> Result<()> {
-        self.read_to(View::Points, out.into())
+    /// The last published state at the region's nodes or the attached points, `[n,3]`.
+    ///
+    /// # Errors
+    /// [`Error::State`](crate::Error::State) where no points are attached.
+    pub fn read_view(&self, view: View, out: &mut [f32]) -> Result<()> {
+        self.read_to(view, out.into())
     }
 
     /// Between the state before (`alpha` 0) and the last state (1), region order. `alpha` is clamped to `[0, 1]`.
@@ -35,9 +38,12 @@ impl Scene {
         self.sample_to(View::Region, alpha, out.into())
     }
 
-    /// As [`Scene::sample`], at the attached points.
-    pub fn sample_points(&self, alpha: f64, out: &mut [f32]) -> Result<()> {
-        self.sample_to(View::Points, alpha, out.into())
+    /// As [`Scene::sample`], at the region's nodes or the attached points.
+    ///
+    /// # Errors
+    /// As [`Scene::read_view`].
+    pub fn sample_view(&self, view: View, alpha: f64, out: &mut [f32]) -> Result<()> {
+        self.sample_to(view, alpha, out.into())
     }
 
     /// Displacement `[n,3]` of any nodes in the last state.
@@ -45,7 +51,7 @@ impl Scene {
     /// # Errors
     /// [`Error::State`](crate::Error::State) before the first step.
     pub fn decode(&self, nodes: &[u32], out: &mut [f32]) -> Result<()> {
-        self.decode_to(nodes, out.into())
+        self.decode_to(Some(nodes), out.into())
     }
 
     /// The last published state at the region or the points, into memory that need not be initialised.
@@ -58,8 +64,8 @@ impl Scene {
         lock_read(&self.shared.published).sample(view, alpha, out)
     }
 
-    /// [`Scene::decode`] into memory that need not be initialised.
-    pub(crate) fn decode_to(&self, nodes: &[u32], out: Output<'_, f32>) -> Result<()> {
+    /// [`Scene::decode`] into memory that need not be initialised; `None`: all nodes.
+    pub(crate) fn decode_to(&self, nodes: Option<&[u32]>, out: Output<'_, f32>) -> Result<()> {
         self.with(|core, published| core.decode(published, nodes, out))
     }
 

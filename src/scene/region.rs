@@ -26,26 +26,27 @@ impl Published {
 }
 
 impl Core {
-    /// Decodes any nodes of the last state into `out [n,3]`, mm. Nothing of the scene changes but the spare frame.
+    /// Decodes any nodes of the last state into `out [n,3]`, mm; `None`: all. Nothing of the scene changes but the spare frame.
     ///
     /// # Errors
     /// [`Error::Argument`] for a node that is not of the mesh and a wrong length, [`Error::State`] before the first step.
     pub(super) fn decode(
         &mut self,
         published: &RwLock<Published>,
-        nodes: &[u32],
+        nodes: Option<&[u32]>,
         out: Output<'_, f32>,
     ) -> Result<()> {
         let count = self.maker.body.mesh.node_count();
-        if out.len() != 3 * nodes.len() {
+        let wanted = nodes.map_or(count, <[u32]>::len);
+        if out.len() != 3 * wanted {
             return Err(Error::Argument(format!(
                 "out has {} floats, must have {}",
                 out.len(),
-                3 * nodes.len()
+                3 * wanted
             )));
         }
-        check_nodes(nodes, count)?;
-        if nodes.is_empty() {
+        check_nodes(nodes.unwrap_or_default(), count)?;
+        if wanted == 0 {
             return Ok(());
         }
         if self.maker.states.counters.step_count == 0 {
@@ -54,12 +55,19 @@ impl Core {
             ));
         }
         let _mode = FlushToZero::of(self.maker.machine.isa);
-        let plan = NodePlan::new(&[nodes], count, self.maker.engine.planned_prior())?;
+        let table = self.maker.engine.planned_prior();
+        let plan = match nodes {
+            Some(nodes) => NodePlan::new(&[nodes], count, table)?,
+            None => NodePlan::all(count, table)?,
+        };
         let points = AttachedPoints::default();
         self.maker
             .decode_published(published, Which::Last, &plan, &points, &mut [])?;
         let field = self.maker.states.next.field.as_chunks::<3>().0;
-        out.write_rows(nodes.iter().map(|&node| field[node as usize]));
+        match nodes {
+            Some(nodes) => out.write_rows(nodes.iter().map(|&node| field[node as usize])),
+            None => out.write_rows(field.iter().copied()),
+        }
         Ok(())
     }
 

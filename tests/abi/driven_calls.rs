@@ -76,20 +76,8 @@ impl World<'_> {
                     let mut when = [(call.seed % 120) as f32 * 1e-3];
                     spoil(&mut when, call.odd, 0);
                     let when = when[0].into();
-                    let mut view = upt_view::POINTS;
-                    view.struct_size = sized::<upt_view>(call);
-                    if call.seed % 3 == 2 {
-                        view.kind = UPT_VIEW_SURFACE;
-                    }
-                    if call.odd == Odd::Wrong && call.seed.is_multiple_of(5) {
-                        view.kind = 7;
-                    }
-                    let points = self.points.get(&scene.addr()).copied().unwrap_or(1);
-                    let (view, shown) = match call.seed % 3 {
-                        0 => (null(), nodes),
-                        1 => (&raw const view, points),
-                        _ => (&raw const view, Self::counts(scene)[0]),
-                    };
+                    let (view, shown) = self.view(scene, call, nodes);
+                    let view = view.as_ref().map_or(null(), |view| &raw const *view);
                     let status = Self::output(call, 1, 3 * shown, true, |out, floats| {
                         upt_scene_present(scene, at(&input, call), when, view, out, floats)
                     });

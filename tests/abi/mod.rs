@@ -51,8 +51,6 @@ pub enum Function {
     SetRegion,
     Decode,
     AttachPoints,
-    ReadPoints,
-    SamplePoints,
     Instruments,
     Present,
     Readings,
@@ -118,8 +116,6 @@ pub const CALLED_BY: &[(&str, Function)] = &[
     ("upt_scene_set_region", SetRegion),
     ("upt_scene_decode", Decode),
     ("upt_scene_attach_points", AttachPoints),
-    ("upt_scene_read_points", ReadPoints),
-    ("upt_scene_sample_points", SamplePoints),
     ("upt_scene_contacts_from_instruments", Instruments),
     ("upt_scene_present", Present),
     ("upt_scene_read_instruments", Readings),
@@ -204,7 +200,7 @@ pub fn call() -> impl Strategy<Value = Call> {
         3 => few(&[Function::Record, TakeRecord]),
         12 => few(&[Submit, Submit, Poll, Wait, Wait]),
         30 => few(&[
-            Read, Sample, SetRegion, Decode, AttachPoints, ReadPoints, SamplePoints, Instruments,
+            Read, Sample, SetRegion, Decode, AttachPoints, Instruments,
             InstrumentContacts, ContactForce, Stats, Timing, Save, Restore, Restore, SceneReset,
         ]),
     ];

@@ -46,8 +46,10 @@ impl World<'_> {
                     ("upt_scene_step_field", status)
                 }
                 Function::Read => {
-                    let status = Self::output(call, 0, 3 * nodes, true, |out, count| {
-                        upt_scene_read(scene, out, count)
+                    let (view, shown) = self.view(scene, call, nodes);
+                    let view = view.as_ref().map_or(null(), |view| &raw const *view);
+                    let status = Self::output(call, 0, 3 * shown, true, |out, count| {
+                        upt_scene_read(scene, view, out, count)
                     });
                     ("upt_scene_read", status)
                 }
@@ -56,7 +58,7 @@ impl World<'_> {
                     "upt_scene_wait",
                     upt_scene_wait(scene, (call.seed % 50) as u32),
                 ),
-                Function::Sample | Function::SamplePoints => {
+                Function::Sample => {
                     let alpha = match call.odd {
                         Odd::None | Odd::Denormal => (call.seed % 101) as f64 / 100.0,
                         Odd::NaN => f64::NAN,
@@ -64,17 +66,12 @@ impl World<'_> {
                         Odd::Huge => 1e300,
                         Odd::Wrong => -0.5,
                     };
-                    if call.function == Function::Sample {
-                        let status = Self::output(call, 0, 3 * nodes, true, |out, count| {
-                            upt_scene_sample(scene, alpha, out, count)
-                        });
-                        return ("upt_scene_sample", status);
-                    }
-                    let points = self.points.get(&scene.addr()).copied().unwrap_or(1);
-                    let status = Self::output(call, 0, 3 * points, true, |out, count| {
-                        upt_scene_sample_points(scene, alpha, out, count)
+                    let (view, shown) = self.view(scene, call, nodes);
+                    let view = view.as_ref().map_or(null(), |view| &raw const *view);
+                    let status = Self::output(call, 0, 3 * shown, true, |out, count| {
+                        upt_scene_sample(scene, alpha, view, out, count)
                     });
-                    ("upt_scene_sample_points", status)
+                    ("upt_scene_sample", status)
                 }
                 Function::SetRegion => {
                     // All nodes in another order: outputs keep their length.
@@ -103,10 +100,12 @@ impl World<'_> {
                             }
                         })
                         .collect();
+                    let mut view = upt_view::of_nodes(&listed);
+                    view.struct_size = sized::<upt_view>(call);
+                    view.nodes = pointer(&listed, call, 1);
+                    view.node_count = absurd(listed.len(), nodes, call);
                     let status = Self::output(call, 0, 3 * listed.len(), true, |out, count| {
-                        let length = absurd(listed.len(), nodes, call);
-                        let nodes = pointer(&listed, call, 1);
-                        upt_scene_decode(scene, nodes, length, out, count)
+                        upt_scene_decode(scene, &view, out, count)
                     });
                     ("upt_scene_decode", status)
                 }
@@ -125,13 +124,6 @@ impl World<'_> {
                         self.points.insert(scene.addr(), points);
                     }
                     ("upt_scene_attach_points", status)
-                }
-                Function::ReadPoints => {
-                    let points = self.points.get(&scene.addr()).copied().unwrap_or(1);
-                    let status = Self::output(call, 0, 3 * points, true, |out, count| {
-                        upt_scene_read_points(scene, out, count)
-                    });
-                    ("upt_scene_read_points", status)
                 }
                 Function::ContactForce => {
                     let mut stats: upt_scene_stats = std::mem::zeroed();

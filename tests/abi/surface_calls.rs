@@ -3,7 +3,7 @@
 use upt::ffi::*;
 
 use super::inputs::*;
-use super::{Call, Function, World};
+use super::{Call, Function, Odd, World};
 
 impl World<'_> {
     pub(super) fn call_surface(
@@ -62,6 +62,33 @@ impl World<'_> {
                 ("upt_scene_read_surface_positions", status)
             }
         }
+    }
+
+    /// A view, and how many rows it has.
+    pub(super) fn view(
+        &self,
+        scene: *mut upt_scene,
+        call: &Call,
+        nodes: usize,
+    ) -> (Option<upt_view>, usize) {
+        let mut view = upt_view::POINTS;
+        view.struct_size = sized::<upt_view>(call);
+        let rows = match call.seed % 4 {
+            0 => return (None, nodes),
+            1 => self.points.get(&scene.addr()).copied().unwrap_or(1),
+            2 => {
+                view.kind = UPT_VIEW_SURFACE;
+                Self::counts(scene)[0]
+            }
+            _ => {
+                view.kind = UPT_VIEW_NODES;
+                nodes
+            }
+        };
+        if call.odd == Odd::Wrong && call.seed.is_multiple_of(5) {
+            view.kind = 7;
+        }
+        (Some(view), rows)
     }
 
     /// Vertices, triangles and changes of the surface, where the scene tells; asking for it drops the list of changes.

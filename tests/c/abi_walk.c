@@ -34,7 +34,7 @@ upt_scene *make_scene_with(int32_t guard_policy) {
 upt_scene *make_scene(void) { return make_scene_with(UPT_GUARD_REPORT); }
 
 void expect_unchanged(upt_scene *scene) {
-  EXPECT(upt_scene_read(scene, after, floats), UPT_OK);
+  EXPECT(upt_scene_read(scene, NULL, after, floats), UPT_OK);
   EXPECT_TRUE(memcmp(before, after, (size_t)floats * sizeof *before) == 0);
 }
 

@@ -148,7 +148,7 @@ static void walk_driven(upt_scene *scene, const float *rest, uint32_t node, upt_
   int i, step;
   memset(&stats, 0, sizeof stats);
   stats.struct_size = sizeof stats;
-  EXPECT(upt_scene_read(scene, before, floats), UPT_OK);
+  EXPECT(upt_scene_read(scene, NULL, before, floats), UPT_OK);
   walk_refusals(scene, at_node(rest, node, UPT_SHAPE_BOX, NULL), hull);
   for (i = 0; i < 4; i++) {
     EXPECT(upt_scene_reset(scene), UPT_OK);

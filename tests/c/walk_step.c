@@ -132,17 +132,17 @@ void walk_step(void) {
   expect_unchanged(scene);
 
   /* So does one that the guard refuses. */
-  EXPECT(upt_scene_read(held, before, floats), UPT_OK);
+  EXPECT(upt_scene_read(held, NULL, before, floats), UPT_OK);
   contact_vectors[5] = 1000.0F;
   EXPECT(step_nodes(held, contact_nodes, contact_vectors, 4, NULL, 0), UPT_ERR_GUARD);
   contact_vectors[5] = -2.0F;
   expect_unchanged(held);
   EXPECT(upt_scene_destroy(held), UPT_OK);
 
-  EXPECT(upt_scene_read(NULL, after, floats), UPT_ERR_NULL);
-  EXPECT(upt_scene_read(scene, NULL, floats), UPT_ERR_NULL);
-  EXPECT(upt_scene_read(scene, NULL, 0), UPT_ERR_ARGUMENT);
-  EXPECT(upt_scene_read(scene, after, 3), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_read(NULL, NULL, after, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_read(scene, NULL, NULL, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_read(scene, NULL, NULL, 0), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_read(scene, NULL, after, 3), UPT_ERR_ARGUMENT);
 
   /* The output may be the memory of an input. */
   field[0] = 0.0F;
@@ -154,7 +154,7 @@ void walk_step(void) {
 
   EXPECT(upt_scene_reset(NULL), UPT_ERR_NULL);
   EXPECT(upt_scene_reset(scene), UPT_OK);
-  EXPECT(upt_scene_read(scene, after, floats), UPT_OK);
+  EXPECT(upt_scene_read(scene, NULL, after, floats), UPT_OK);
   for (i = 0; i < (int)floats; i++) {
     if (after[i] != 0.0F) {
       EXPECT_TRUE(after[i] == 0.0F);
@@ -179,7 +179,7 @@ void walk_worker(void) {
   EXPECT(upt_scene_wait(scene, 0), UPT_ERR_STATE);
   EXPECT(submit_nodes(scene, contact_nodes, contact_vectors, 4), UPT_OK);
   EXPECT(upt_scene_wait(scene, 60000), UPT_OK);
-  EXPECT(upt_scene_read(scene, before, floats), UPT_OK);
+  EXPECT(upt_scene_read(scene, NULL, before, floats), UPT_OK);
   EXPECT(step_nodes(twin, contact_nodes, contact_vectors, 4, after, floats), UPT_OK);
   EXPECT_TRUE(memcmp(before, after, (size_t)floats * sizeof *before) == 0);
 
@@ -191,7 +191,7 @@ void walk_worker(void) {
     if (status == UPT_ERR_BUSY) {
       EXPECT(status, UPT_ERR_BUSY);
     }
-    EXPECT(upt_scene_read(scene, after, floats), UPT_OK);
+    EXPECT(upt_scene_read(scene, NULL, after, floats), UPT_OK);
     status = upt_scene_poll(scene);
     if (status == UPT_PENDING) {
       EXPECT(status, UPT_PENDING);
@@ -214,12 +214,12 @@ void walk_worker(void) {
   EXPECT(upt_scene_destroy(held), UPT_OK);
   contact_vectors[5] = -2.0F;
 
-  EXPECT(upt_scene_sample(NULL, 0.5, after, floats), UPT_ERR_NULL);
-  EXPECT(upt_scene_sample(scene, 0.5, NULL, floats), UPT_ERR_NULL);
-  EXPECT(upt_scene_sample(scene, NAN, after, floats), UPT_ERR_NON_FINITE);
-  EXPECT(upt_scene_sample(scene, 0.5, after, 6), UPT_ERR_ARGUMENT);
-  EXPECT(upt_scene_sample(scene, 1.0, after, floats), UPT_OK);
-  EXPECT(upt_scene_read(scene, before, floats), UPT_OK);
+  EXPECT(upt_scene_sample(NULL, 0.5, NULL, after, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_sample(scene, 0.5, NULL, NULL, floats), UPT_ERR_NULL);
+  EXPECT(upt_scene_sample(scene, NAN, NULL, after, floats), UPT_ERR_NON_FINITE);
+  EXPECT(upt_scene_sample(scene, 0.5, NULL, after, 6), UPT_ERR_ARGUMENT);
+  EXPECT(upt_scene_sample(scene, 1.0, NULL, after, floats), UPT_OK);
+  EXPECT(upt_scene_read(scene, NULL, before, floats), UPT_OK);
   EXPECT_TRUE(memcmp(before, after, (size_t)floats * sizeof *before) == 0);
   EXPECT(upt_scene_destroy(scene), UPT_OK);
   EXPECT(upt_scene_destroy(twin), UPT_OK);

@@ -199,7 +199,11 @@ int main(int argc, char **argv) {
   // A frame without contact: empty lists everywhere.
   EXPECT(scene.step(upt::Input::contacts({}, {})), UPT_OK);
   EXPECT(scene.contact_force({}), UPT_OK);
-  EXPECT(scene.decode({}, {}), UPT_OK);
+  {
+    std::vector<float> all(3 * info.node_count);
+    EXPECT(scene.decode(upt::view(upt::span<const std::uint32_t>{}), all), UPT_OK);
+    EXPECT_TRUE(thrown([&] { scene.read(all, upt::view(UPT_VIEW_NODES)); }) == UPT_ERR_UNSUPPORTED);
+  }
   EXPECT(scene.reset(), UPT_OK);
   upt::Model moved = std::move(model);
   EXPECT_TRUE(!model && moved);

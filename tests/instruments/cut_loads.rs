@@ -238,7 +238,7 @@ fn forces_at_points_of_a_lip_open_the_slit() {
             assert!(both.scene.stats().min_det > 0.2, "{:?}", both.scene.stats());
         }
         let mut u = [0.0; 12];
-        both.scene.read_points(&mut u).unwrap();
+        both.scene.read_view(upt::View::Points, &mut u).unwrap();
         // How far each point has gone the way that its lip goes when the slit opens.
         let gone = [0, 1, 2, 3].map(|point: usize| {
             let way = across * [1.0, -1.0][point / 2];
@@ -253,7 +253,7 @@ fn forces_at_points_of_a_lip_open_the_slit() {
         assert!(mean < 0.005 && squares[23] < 0.002, "{squares:?}");
     }
     let mut u = [0.0; 12];
-    both.scene.read_points(&mut u).unwrap();
+    both.scene.read_view(upt::View::Points, &mut u).unwrap();
     let there = Vector::from(places[1][0]) + Vector::from_slice(&u[6..9]);
     let scene = &both.scene;
     scene.remove(&ball(9.0, there.to_array()), 1e6).unwrap();

@@ -30,7 +30,7 @@ fn openings(points: &[f32]) -> Vec<f32> {
 
 fn points_of(scene: &Scene) -> Vec<f32> {
     let mut u = vec![0.0; 3 * scene.point_count()];
-    scene.read_points(&mut u).unwrap();
+    scene.read_view(upt::View::Points, &mut u).unwrap();
     u
 }
 

@@ -223,6 +223,7 @@ fn a_host_in_c_cuts_as_one_in_rust() {
         );
         let status = upt_scene_read(
             scene,
+            std::ptr::null(),
             u.as_mut_ptr(),
             3 * fixture::host::node_count(model) as u64,
         );

@@ -50,7 +50,7 @@ fn tool(one: &upt_instrument) -> Tool {
 
 fn state(host: &Host) -> Vec<u32> {
     let mut u = vec![0.0f32; 3 * host.nodes];
-    let read = unsafe { upt_scene_read(host.scene, u.as_mut_ptr(), u.len() as u64) };
+    let read = unsafe { upt_scene_read(host.scene, null(), u.as_mut_ptr(), u.len() as u64) };
     assert_eq!(read, UPT_OK, "{}", message());
     bits(&u)
 }

@@ -318,6 +318,31 @@ fn mistakes_are_named_and_change_nothing() {
         UPT_ERR_ARGUMENT,
         "view.kind",
     );
+    for kind in [UPT_VIEW_NODES, UPT_VIEW_SURFACE] {
+        view.kind = kind;
+        let read = unsafe { upt_scene_read(host.scene, &view, to, floats) };
+        let what = format!("kind {kind} of a state");
+        let named = if kind == UPT_VIEW_NODES {
+            "view.kind"
+        } else {
+            "surface"
+        };
+        check("upt_scene_read", &what, read, UPT_ERR_UNSUPPORTED, named);
+    }
+    view.kind = UPT_VIEW_NODES;
+    let shown = unsafe { upt_scene_present(host.scene, &driven, 0.01, &view, to, floats) };
+    let status = UPT_ERR_UNSUPPORTED;
+    check("upt_scene_present", "nodes", shown, status, "view.kind");
+    // What a view of nodes of another model has, or a list where the kind takes none.
+    for (kind, nodes, named) in [
+        (UPT_VIEW_NODES, &FAR[..], "nodes[0] is 1073741824"),
+        (UPT_VIEW_POINTS, &FAR[..], "view.node_count"),
+    ] {
+        let mut view = upt_view::of_nodes(nodes);
+        view.kind = kind;
+        let shown = unsafe { upt_scene_decode(host.scene, &view, to, 3) };
+        check("upt_scene_decode", "nodes", shown, UPT_ERR_ARGUMENT, named);
+    }
     view.struct_size = 4;
     let shown = unsafe { upt_scene_present(host.scene, &driven, 0.01, &view, to, floats) };
     check(

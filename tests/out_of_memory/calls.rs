@@ -111,10 +111,12 @@ impl Rig {
         );
         let mut out = vec![0.0f32; 3 * nodes as usize];
         let mut floats = out.len() as u64;
-        let mut read = counted(|| unsafe { upt_scene_read(self.scene, out.as_mut_ptr(), floats) });
+        let mut read =
+            counted(|| unsafe { upt_scene_read(self.scene, null(), out.as_mut_ptr(), floats) });
         if read != UPT_OK {
             floats = 3 * self.few().len() as u64;
-            read = counted(|| unsafe { upt_scene_read(self.scene, out.as_mut_ptr(), floats) });
+            read =
+                counted(|| unsafe { upt_scene_read(self.scene, null(), out.as_mut_ptr(), floats) });
         }
         assert_eq!(read, UPT_OK, "{}", host::message());
         self.give(status, &out)
@@ -234,10 +236,10 @@ impl Rig {
 
     pub fn decode(&mut self) -> i32 {
         let mut out = vec![0.0f32; 3 * self.domain.len()];
-        let (nodes, count) = (self.domain.as_ptr(), self.domain.len() as u64);
-        let status = counted(|| unsafe {
-            upt_scene_decode(self.scene, nodes, count, out.as_mut_ptr(), 3 * count)
-        });
+        let view = upt_view::of_nodes(&self.domain);
+        let floats = out.len() as u64;
+        let status =
+            counted(|| unsafe { upt_scene_decode(self.scene, &view, out.as_mut_ptr(), floats) });
         self.give(status, &out)
     }
 

@@ -168,7 +168,7 @@ const tests = {
     assert.equal(shown.length, 3 * nodes.length);
     nodes.forEach((node, i) => assert.deepEqual([...shown.subarray(3 * i, 3 * i + 3)], [...all.subarray(3 * node, 3 * node + 3)]));
     const node = 3 * model.indices("domainNodes")[0];
-    scene.readPoints().forEach((moved, axis) => assert.ok(Math.abs(moved - all[node + axis]) < 1e-4));
+    scene.read({ points: true }).forEach((moved, axis) => assert.ok(Math.abs(moved - all[node + axis]) < 1e-4));
     assert.equal(scene.present(0.01, tool, { points: true }).length, 3);
     assert.ok(scene.stats().step_count === 1 && scene.readings()[0].contact_count > 0);
   },

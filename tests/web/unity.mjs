@@ -188,7 +188,7 @@ const tests = {
           assert.equal(calls.upt_scene_submit(scene, input), abi.UPT_ERR_BUSY);
           assert.match(player.text(calls.upt_last_error()), /not collected/);
           assert.equal(step % 4 ? calls.upt_scene_poll(scene) : calls.upt_scene_wait(scene, 100), abi.UPT_OK);
-          player.ok(calls.upt_scene_read(scene, room, ...wide(3 * nodes)));
+          player.ok(calls.upt_scene_read(scene, view, room, ...wide(3 * nodes)));
         }
         assert.deepEqual(player.floats(room, 3 * nodes), states[3 * step]);
         player.ok(calls.upt_scene_read_instruments(scene, reading, ...wide(1)));
@@ -215,7 +215,13 @@ const tests = {
     const input = player.struct(abi.upt_input);
     player.ok(calls.upt_scene_submit(scene, input));
     player.ok(calls.upt_scene_wait(scene, 0xffffffff));
-    player.ok(calls.upt_scene_read(scene, player.room(12 * count), BigInt(3 * count)));
+    const shown = player.room(12 * count);
+    player.ok(calls.upt_scene_read(scene, 0, shown, BigInt(3 * count)));
+    // The list of a view passes through, too.
+    const view = player.struct(abi.upt_view, { kind: abi.UPT_VIEW_NODES, nodes, node_count: count });
+    const decoded = player.room(12 * count);
+    player.ok(calls.upt_scene_decode(scene, view, decoded, BigInt(3 * count)));
+    assert.deepEqual(player.floats(decoded, 3 * count), player.floats(shown, 3 * count));
     const described = player.room(4096);
     player.ok(calls.upt_model_describe(model, described, 4096n, needed));
     assert.equal(JSON.parse(player.text(described)).name, "liver");

@@ -80,6 +80,7 @@ export const UPT_SET_TETS = 5;
 export const UPT_VIEW_REGION = 0;
 export const UPT_VIEW_POINTS = 1;
 export const UPT_VIEW_SURFACE = 2;
+export const UPT_VIEW_NODES = 3;
 export const UPT_SHAPE_CAPSULE = 0;
 export const UPT_SHAPE_BOX = 1;
 export const UPT_SHAPE_SPATULA = 2;
@@ -344,10 +345,12 @@ export const upt_bed = {
   },
 };
 export const upt_view = {
-  size: 8,
+  size: 24,
   fields: {
     struct_size: ["Uint32", 0, 1],
     kind: ["Int32", 4, 1],
+    nodes: ["Uint32", 8, 1],
+    node_count: ["BigUint64", 16, 1],
   },
 };
 export const upt_instrument = {

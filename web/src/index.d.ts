@@ -353,8 +353,8 @@ export interface Scene {
   tieReadings(count: number): TieReading[];
   /** The tissue `when` seconds after the last step, with the instruments there: of the region, of the attached points, or of the surface's vertices. */
   present(when: number, instruments?: Instrument[], options?: { points?: boolean; surface?: boolean; loads?: Loads }): Float32Array;
-  /** The last published state, as `step` gives it. */
-  read(): Float32Array;
+  /** The last published state, as `step` gives it, or of the attached points, [p,3], mm. */
+  read(options?: { points?: boolean }): Float32Array;
   /** Of the last step's instruments, in their order. */
   readings(): Reading[];
   /** What the last step was. */
@@ -363,10 +363,8 @@ export interface Scene {
   timing(): Timing;
   /** The nodes that are shown from here on; none means all. */
   setRegion(nodes?: ArrayLike<number> & Iterable<number>): void;
-  /** Points [p,3] at rest, mm. */
+  /** Points [p,3] at rest, mm, that `read` and `present` show with `points`. */
   attachPoints(points: ArrayLike<number> & Iterable<number>): void;
-  /** Displacements [p,3] of the attached points in the last state, mm. */
-  readPoints(): Float32Array;
   /** Of the body: copies that cuts have made included. */
   readonly nodeCount: number;
   /** A blade's edge goes from pose to pose, [n, points, 3] mm, and cuts what it passes. */

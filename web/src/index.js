@@ -163,18 +163,24 @@ class Scene {
 
   /** The tissue `when` seconds after the last step, with the instruments there; as `step`, or of the attached points, or of the surface's vertices. */
   present(when, instruments = [], { points = false, surface = false, loads = undefined } = {}) {
-    const view = this.#input + abi.upt_input.size;
-    const kind = points ? abi.UPT_VIEW_POINTS : surface ? abi.UPT_VIEW_SURFACE : abi.UPT_VIEW_REGION;
-    this.#refuseIfClosed();
-    this.#module.write(view, abi.upt_view, { kind });
+    const view = this.#viewed({ points, surface });
     const count = points ? this.#points : surface ? this.#vertices : this.#shown;
     const show = (input, ...out) => this.#module.run("upt_scene_present", this.handle, input, when, view, ...out);
     return this.#driven(count, { instruments, timeS: 0, loads }, show);
   }
 
-  /** Displacements of the region in the last state. */
-  read() {
-    return this.#filled(this.#shown, (at, floats) => this.#module.run("upt_scene_read", this.handle, at, floats));
+  /** Displacements in the last state, of the region or of the attached points. */
+  read({ points = false } = {}) {
+    const view = this.#viewed({ points });
+    return this.#filled(points ? this.#points : this.#shown, (at, floats) => this.#module.run("upt_scene_read", this.handle, view, at, floats));
+  }
+
+  // Where the view is that the calls take.
+  #viewed({ points, surface = false }) {
+    const view = this.#input + abi.upt_input.size;
+    this.#refuseIfClosed();
+    this.#module.write(view, abi.upt_view, { kind: points ? abi.UPT_VIEW_POINTS : surface ? abi.UPT_VIEW_SURFACE : abi.UPT_VIEW_REGION });
+    return view;
   }
 
   /** What the last step did to its instruments: the fields of `upt_instrument_reading`. */
@@ -292,11 +298,6 @@ class Scene {
     const floats = Float32Array.from(points);
     this.#withList(floats, (at) => this.#module.run("upt_scene_attach_points", this.handle, at, BigInt(floats.length / 3)));
     this.#points = floats.length / 3;
-  }
-
-  /** Displacements [p,3] of the attached points in the last state. */
-  readPoints() {
-    return this.#filled(this.#points, (at, floats) => this.#module.run("upt_scene_read_points", this.handle, at, floats));
   }
 
   /** Begins to record what the scene is given, for `upt replay --verify`, with a hash after every so many steps; 0 ends it. */

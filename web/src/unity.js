@@ -30,16 +30,14 @@ upt_scene_destroy scene
 upt_scene_reset scene
 upt_scene_step scene input:<upt_input out:>u32*out_count out_count:l
 upt_scene_step_field scene displacement:<u32*3*K collision:<u32*3*K out:>u32*out_count out_count:l
-upt_scene_read scene out:>u32*out_count out_count:l
+upt_scene_read scene view:<upt_view out:>u32*out_count out_count:l
 upt_scene_submit scene input:<upt_input
 upt_scene_poll scene
 upt_scene_wait scene timeout_ms
-upt_scene_sample scene alpha out:>u32*out_count out_count:l
+upt_scene_sample scene alpha view:<upt_view out:>u32*out_count out_count:l
 upt_scene_set_region scene nodes:<u32*count count:l
-upt_scene_decode scene nodes:<u32*count count:l out:>u32*out_count out_count:l
+upt_scene_decode scene view:<upt_view out:>u32*out_count out_count:l
 upt_scene_attach_points scene points:<u32*3*count count:l
-upt_scene_read_points scene out:>u32*out_count out_count:l
-upt_scene_sample_points scene alpha out:>u32*out_count out_count:l
 upt_scene_read_instruments scene out:=upt_instrument_reading*count count:l
 upt_scene_read_instrument_contacts scene out:=upt_instrument_contact*capacity capacity:l needed:>u64
 upt_hull_create points:<u32*3*point_count point_count:l faces:<u32*3*face_count face_count:l out:>u32
@@ -91,6 +89,7 @@ const INNER = {
   upt_pressure: { nodes: "u32*node_count" },
   upt_bed: { nodes: "u32*node_count" },
   upt_support: { displacements: "u32*displacement_count" },
+  upt_view: { nodes: "u32*node_count" },
 };
 const SIZES = { u8: 1, u32: 4, u64: 8 };
 

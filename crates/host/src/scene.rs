@@ -74,16 +74,14 @@ impl Scene {
     /// `upt_scene_decode`: displacement of any nodes in the last state.
     pub fn decode(&mut self, nodes: &[u32], out: &mut [[f32; 3]]) -> Result<()> {
         // SAFETY: the pointers and counts describe the slices.
-        let status = unsafe {
+        check(unsafe {
             ffi::upt_scene_decode(
                 self.handle,
-                nodes.as_ptr(),
-                nodes.len() as u64,
+                &ffi::upt_view::of_nodes(nodes),
                 out.as_mut_ptr().cast(),
                 3 * out.len() as u64,
             )
-        };
-        check(status)
+        })
     }
 
     /// `upt_scene_step` with instruments.
@@ -259,6 +257,7 @@ impl Scene {
             ffi::upt_scene_sample(
                 self.handle,
                 alpha,
+                std::ptr::null(),
                 out.as_mut_ptr().cast(),
                 3 * out.len() as u64,
             )

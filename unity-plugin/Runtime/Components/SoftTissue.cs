@@ -507,14 +507,9 @@ namespace Upt
         }
 
         /// <summary>A small sphere that touches nothing.</summary>
-        private static unsafe upt_instrument FarAway()
+        private static upt_instrument FarAway()
         {
-            upt_instrument sphere = default(upt_instrument);
-            sphere.struct_size = (uint)sizeof(upt_instrument);
-            sphere.shape = Native.UPT_SHAPE_SPHERE;
-            sphere.position[0] = 5000f;
-            sphere.radius = 1f;
-            return sphere;
+            return Instruments.Sphere(1f).At(5000f, 0f, 0f);
         }
 
         /// <summary>Whether the bundle has a linear response to solve contact with. The scene is at rest after it.</summary>

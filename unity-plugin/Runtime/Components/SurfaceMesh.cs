@@ -76,7 +76,7 @@ namespace Upt
         /// allocated.</summary>
         public void Sample(Scene scene, double alpha)
         {
-            scene.SamplePoints(alpha, (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement), displacement.Length);
+            scene.Sample(alpha, Native.UPT_VIEW_POINTS, (float*)NativeArrayUnsafeUtility.GetUnsafePtr(displacement), displacement.Length);
         }
 
         /// <summary>Whether a scene at rest can show the present moment.</summary>

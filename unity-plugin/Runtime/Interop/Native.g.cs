@@ -233,6 +233,8 @@ namespace Upt.Interop
         UPT_VIEW_POINTS = 1,
         /// <summary>The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.</summary>
         UPT_VIEW_SURFACE = 2,
+        /// <summary>The view's own `nodes`, in the region or not. Only `upt_scene_decode` takes it.</summary>
+        UPT_VIEW_NODES = 3,
     }
 
     /// <summary>Shape of an instrument.</summary>
@@ -762,6 +764,10 @@ namespace Upt.Interop
         public uint struct_size;
         /// <summary>`UPT_VIEW_*`.</summary>
         public upt_view_kind kind;
+        /// <summary>`[node_count]`, only with `UPT_VIEW_NODES`: indices, in the order of the output; NULL with count 0: all nodes.</summary>
+        public uint* nodes;
+        /// <summary>At most K.</summary>
+        public ulong node_count;
     }
 
     /// <summary>A rigid instrument, as `upt_input` and `upt_scene_contacts_from_instruments` take it.</summary>
@@ -1112,6 +1118,8 @@ namespace Upt.Interop
         public const upt_view_kind UPT_VIEW_POINTS = upt_view_kind.UPT_VIEW_POINTS;
         /// <summary>The vertices of the surface as the last `upt_scene_update_surface` left it, each from its place at rest: the lips of cuts too.</summary>
         public const upt_view_kind UPT_VIEW_SURFACE = upt_view_kind.UPT_VIEW_SURFACE;
+        /// <summary>The view's own `nodes`, in the region or not. Only `upt_scene_decode` takes it.</summary>
+        public const upt_view_kind UPT_VIEW_NODES = upt_view_kind.UPT_VIEW_NODES;
         /// <summary>An instrument's shape: a capsule along local y.</summary>
         public const upt_shape UPT_SHAPE_CAPSULE = upt_shape.UPT_SHAPE_CAPSULE;
         /// <summary>An instrument's shape: a box.</summary>
@@ -1410,14 +1418,16 @@ namespace Upt.Interop
         /// <summary>
         /// Copies the last published state.
         ///
-        /// - `out`: `[n,3]`, mm, in the region's order (all nodes when there is none).
+        /// - `view`: the region (all nodes where there is none), or the attached points; NULL: the region.
+        /// - `out`: `[n,3]`, mm, in the view's order.
         /// - `out_count`: number of floats in `out`, 3 n.
         ///
         /// Threads: any, at any time, even while a step runs.
-        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
+        /// Errors: `UPT_ERR_STATE` for the points when none are attached, `UPT_ERR_UNSUPPORTED` for another view,
+        /// `UPT_ERR_STRUCT_SIZE`, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_PANIC`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern upt_status upt_scene_read(IntPtr scene, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_read(IntPtr scene, upt_view* view, float* @out, ulong out_count);
 
         /// <summary>
         /// Starts a step on the scene's worker thread and returns at once. An error of an earlier step that was not reported yet
@@ -1462,14 +1472,15 @@ namespace Upt.Interop
         /// Interpolates between the last two states, for frames between steps. Works while a step is in flight.
         ///
         /// - `alpha`: 0 is the state before, 1 the last state; values from 0 to 1.
-        /// - `out`: `[n,3]`, mm, in the region's order.
+        /// - `view`: as in `upt_scene_read`.
+        /// - `out`: `[n,3]`, mm, in the view's order.
         /// - `out_count`: number of floats in `out`, 3 n.
         ///
         /// Threads: any, at any time, even while a step runs.
-        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`, `UPT_ERR_NON_FINITE`, `UPT_ERR_PANIC`.
+        /// Errors: as `upt_scene_read`, and `UPT_ERR_NON_FINITE`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern upt_status upt_scene_sample(IntPtr scene, double alpha, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_sample(IntPtr scene, double alpha, upt_view* view, float* @out, ulong out_count);
 
         /// <summary>
         /// Limits a step to these nodes: `upt_scene_step`, `_read` and `_sample` write them alone, in this order. Fewer nodes
@@ -1485,21 +1496,21 @@ namespace Upt.Interop
         public static extern upt_status upt_scene_set_region(IntPtr scene, uint* nodes, ulong count);
 
         /// <summary>
-        /// Decodes any nodes of the last state, in the region or not.
+        /// Computes any nodes of the last state, in the region or not.
         ///
-        /// - `nodes`: `[n]` indices, n at most K.
-        /// - `out`: `[n,3]`, mm.
+        /// - `view`: of kind `UPT_VIEW_NODES` its nodes; others as in `upt_scene_read`.
+        /// - `out`: `[n,3]`, mm, in the view's order.
         /// - `out_count`: number of floats in `out`, 3 n.
         ///
         /// Threads: one at a time.
-        /// Errors: `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_BUSY`, `UPT_ERR_ARGUMENT`, `UPT_ERR_STATE` before the first step,
-        /// `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, `UPT_ERR_PANIC`.
+        /// Errors: `UPT_ERR_BUSY`, `UPT_ERR_STATE` for nodes before the first step, `UPT_ERR_RUNTIME`, `UPT_ERR_OUT_OF_MEMORY`, and as
+        /// `upt_scene_read`.
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern upt_status upt_scene_decode(IntPtr scene, uint* nodes, ulong count, float* @out, ulong out_count);
+        public static extern upt_status upt_scene_decode(IntPtr scene, upt_view* view, float* @out, ulong out_count);
 
         /// <summary>
-        /// Attaches points to the tissue. They replace those attached before. A bundle of kind `upt` decodes each point in every
+        /// Attaches points to the tissue, which views of kind `UPT_VIEW_POINTS` show. They replace those attached before. A bundle of kind `upt` decodes each point in every
         /// step (unless the scene has `interpolate_points`); one of kind `reduced` interpolates between nodes.
         ///
         /// - `points`: `[n,3]`, rest positions, mm; NULL with count 0 detaches.
@@ -1511,32 +1522,6 @@ namespace Upt.Interop
         /// </summary>
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern upt_status upt_scene_attach_points(IntPtr scene, float* points, ulong count);
-
-        /// <summary>
-        /// Copies the displacement of the attached points in the last state.
-        ///
-        /// - `out`: `[n,3]`, mm.
-        /// - `out_count`: number of floats in `out`, 3 n.
-        ///
-        /// Threads: any, at any time, even while a step runs.
-        /// Errors: `UPT_ERR_STATE` when no points are attached, `UPT_ERR_NULL`, `UPT_ERR_HANDLE`, `UPT_ERR_ARGUMENT`,
-        /// `UPT_ERR_PANIC`.
-        /// </summary>
-        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern upt_status upt_scene_read_points(IntPtr scene, float* @out, ulong out_count);
-
-        /// <summary>
-        /// As `upt_scene_sample`, at the attached points.
-        ///
-        /// - `alpha`: 0 is the state before, 1 the last state.
-        /// - `out`: `[n,3]`, mm.
-        /// - `out_count`: number of floats in `out`, 3 n.
-        ///
-        /// Threads: any, at any time, even while a step runs.
-        /// Errors: as `upt_scene_read_points`, and `UPT_ERR_NON_FINITE`.
-        /// </summary>
-        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
-        public static extern upt_status upt_scene_sample_points(IntPtr scene, double alpha, float* @out, ulong out_count);
 
         /// <summary>
         /// Copies the force, torque and penetration of each instrument at the end of the last step.

@@ -23,21 +23,65 @@ namespace Upt.Interop
             PointCount = points == null ? 0 : points.Length / 3;
         }
 
-        /// <summary>Displacement of the attached points at the last state.</summary>
-        public void ReadPoints(float* output, int floats)
+        /// <summary>The last published displacement of the region or of the attached points (<c>UPT_VIEW_*</c>).
+        /// The pointer may be a <c>NativeArray</c>'s.</summary>
+        public void Read(upt_view_kind view, float* output, int floats)
         {
+            upt_view shown = ViewOf(view);
             IntPtr scene = Enter();
-            try { Status.Check(Native.upt_scene_read_points(scene, output, checked((ulong)floats))); }
+            try { Status.Check(Native.upt_scene_read(scene, &shown, output, checked((ulong)floats))); }
             finally { Leave(); }
         }
 
-        /// <summary>Displacement of the attached points between the last two states. The pointer may be a
-        /// <c>NativeArray</c>'s.</summary>
-        public void SamplePoints(double alpha, float* output, int floats)
+        /// <summary>The last published displacement, in the region's order.</summary>
+        public void Read(float[] output)
         {
+            fixed (float* o = output)
+                Read(Native.UPT_VIEW_REGION, o, output == null ? 0 : output.Length);
+        }
+
+        /// <summary>Displacement between the state before (<paramref name="alpha"/> = 0) and the last state (1), of the
+        /// region or of the attached points (<c>UPT_VIEW_*</c>). The pointer may be a <c>NativeArray</c>'s.</summary>
+        public void Sample(double alpha, upt_view_kind view, float* output, int floats)
+        {
+            upt_view shown = ViewOf(view);
             IntPtr scene = Enter();
-            try { Status.Check(Native.upt_scene_sample_points(scene, alpha, output, checked((ulong)floats))); }
+            try { Status.Check(Native.upt_scene_sample(scene, alpha, &shown, output, checked((ulong)floats))); }
             finally { Leave(); }
+        }
+
+        /// <summary>The same in the region's order.</summary>
+        public void Sample(double alpha, float[] output)
+        {
+            fixed (float* o = output)
+                Sample(alpha, Native.UPT_VIEW_REGION, o, output == null ? 0 : output.Length);
+        }
+
+        /// <summary>Displacement of any nodes, computed now from the latest state.</summary>
+        public void Decode(uint[] nodes, float[] output)
+        {
+            if (nodes == null) throw new ArgumentNullException("nodes");
+            upt_view shown = ViewOf(Native.UPT_VIEW_NODES);
+            IntPtr scene = Enter();
+            try
+            {
+                fixed (uint* n = nodes)
+                fixed (float* o = output)
+                {
+                    shown.nodes = n;
+                    shown.node_count = (ulong)nodes.Length;
+                    Status.Check(Native.upt_scene_decode(scene, &shown, o, Length(output)));
+                }
+            }
+            finally { Leave(); }
+        }
+
+        static upt_view ViewOf(upt_view_kind kind)
+        {
+            upt_view shown = default(upt_view);
+            shown.struct_size = (uint)sizeof(upt_view);
+            shown.kind = kind;
+            return shown;
         }
 
         /// <summary>Displacement at <paramref name="when"/>, between steps, with the instruments or nodes of
@@ -48,9 +92,7 @@ namespace Upt.Interop
         public void Present(StepInput input, double when, upt_view_kind view, float* output, int floats)
         {
             input.Require(NodeCount);
-            upt_view shown = default(upt_view);
-            shown.struct_size = (uint)sizeof(upt_view);
-            shown.kind = view;
+            upt_view shown = ViewOf(view);
             IntPtr scene = Enter();
             try
             {

@@ -154,31 +154,6 @@ namespace Upt.Interop
             finally { Leave(); }
         }
 
-        /// <summary>The last published displacement, in the region's order.</summary>
-        public void Read(float[] output)
-        {
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (float* o = output)
-                    Status.Check(Native.upt_scene_read(scene, o, Length(output)));
-            }
-            finally { Leave(); }
-        }
-
-        /// <summary>Displacement between the state before (<paramref name="alpha"/> = 0) and the last state
-        /// (1).</summary>
-        public void Sample(double alpha, float[] output)
-        {
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (float* o = output)
-                    Status.Check(Native.upt_scene_sample(scene, alpha, o, Length(output)));
-            }
-            finally { Leave(); }
-        }
-
         /// <summary>Only <paramref name="nodes"/> are decoded from now on; null: all nodes.</summary>
         public void SetRegion(uint[] nodes)
         {
@@ -191,20 +166,6 @@ namespace Upt.Interop
             finally { Leave(); }
             hasRegion = nodes != null && nodes.Length > 0;
             RegionCount = hasRegion ? nodes.Length : NodeCount;
-        }
-
-        /// <summary>Displacement of any nodes, decoded now from the latest state.</summary>
-        public void Decode(uint[] nodes, float[] output)
-        {
-            if (nodes == null) throw new ArgumentNullException("nodes");
-            IntPtr scene = Enter();
-            try
-            {
-                fixed (uint* n = nodes)
-                fixed (float* o = output)
-                    Status.Check(Native.upt_scene_decode(scene, n, (ulong)nodes.Length, o, Length(output)));
-            }
-            finally { Leave(); }
         }
 
         /// <summary>What the last step and its stages took, ms.</summary>

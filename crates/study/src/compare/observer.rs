@@ -226,7 +226,8 @@ impl Observer {
     }
 
     fn points(&mut self, truth: &[[f32; 3]]) -> Result<PointErrors> {
-        self.scene.read_points(&mut self.at_points)?;
+        self.scene
+            .read_view(upt::View::Points, &mut self.at_points)?;
         let found = self.found.as_chunks::<3>().0;
         let middle = |field: &[[f32; 3]], edge: &[u32; 2]| {
             let [a, b] = edge.map(|node| field[node as usize].map(f64::from));

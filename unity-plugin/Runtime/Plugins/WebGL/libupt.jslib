@@ -195,14 +195,6 @@ var libupt = {
   upt_scene_attach_points: function () {
     return Libupt.call("upt_scene_attach_points", arguments);
   },
-  upt_scene_read_points__deps: ["$Libupt"],
-  upt_scene_read_points: function () {
-    return Libupt.call("upt_scene_read_points", arguments);
-  },
-  upt_scene_sample_points__deps: ["$Libupt"],
-  upt_scene_sample_points: function () {
-    return Libupt.call("upt_scene_sample_points", arguments);
-  },
   upt_scene_read_instruments__deps: ["$Libupt"],
   upt_scene_read_instruments: function () {
     return Libupt.call("upt_scene_read_instruments", arguments);
