@@ -928,7 +928,7 @@ typedef struct upt_support {
    */
   float position[3];
   /**
-   * `R` as a unit quaternion x, y, z, w; all zero: none.
+   * `R` as a unit quaternion x, y, z, w; all zero is no rotation.
    */
   float rotation[4];
   /**
@@ -1074,7 +1074,7 @@ typedef struct upt_input {
    */
   float support_position[3];
   /**
-   * `R` as a unit quaternion x, y, z, w; all zero: there is no support that moves.
+   * `R` as a unit quaternion x, y, z, w; all zero is no rotation. Position and rotation all zero: there is no support that moves.
    */
   float support_rotation[4];
   /**

@@ -886,7 +886,7 @@ class Input(Record):
     the mesh's frame, which goes with the support, but `gravity`, which is the world's then; the body feels the support's motion as inertia. Pass it in every step; a
     support that goes farther than 40 mm or half a radian in a step is put there."""
     support_rotation: tuple[float, ...] = vector("_support_rotation")
-    """`R` as a unit quaternion x, y, z, w; all zero: there is no support that moves."""
+    """`R` as a unit quaternion x, y, z, w; all zero is no rotation. Position and rotation all zero: there is no support that moves."""
     reserved_end: tuple[int, ...] = vector("_reserved_end")
     """Zero."""
 
@@ -1287,7 +1287,7 @@ class Support(Record):
     position: tuple[float, ...] = vector("_position")
     """As a rigid body in the mesh's frame: a node `x` of the group ends at `R x + position`, mm; at most 40 mm from where it is."""
     rotation: tuple[float, ...] = vector("_rotation")
-    """`R` as a unit quaternion x, y, z, w; all zero: none."""
+    """`R` as a unit quaternion x, y, z, w; all zero is no rotation."""
     let_go: bool = boolean("_let_go")
     """1: the group holds nothing, and its nodes move as all free ones do. Held again, it holds them where they are then. 0: it holds."""
     reserved: tuple[int, ...] = vector("_reserved")

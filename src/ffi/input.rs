@@ -186,7 +186,7 @@ unsafe fn read_loads<'a>(
         support: (raw.support_rotation != [0.0; 4] || raw.support_position != [0.0; 3]).then_some(
             SupportPose {
                 position: raw.support_position,
-                rotation: raw.support_rotation,
+                rotation: convert::rotation(raw.support_rotation),
             },
         ),
     })
@@ -217,17 +217,13 @@ unsafe fn read_supports<'a>(
             );
         }
         let has_pose = one.rotation != [0.0; 4] || one.position != [0.0; 3];
-        let rotation = match one.rotation == [0.0; 4] {
-            true => [0.0, 0.0, 0.0, 1.0],
-            false => one.rotation,
-        };
         let name = format!("input.supports[{index}].displacements");
         supports[index] = GroupMotion {
             group: one.group,
             let_go: one.let_go != 0,
             pose: has_pose.then_some(SupportPose {
                 position: one.position,
-                rotation,
+                rotation: convert::rotation(one.rotation),
             }),
             displacements: match one.displacements.is_null() && one.displacement_count == 0 {
                 true => None,

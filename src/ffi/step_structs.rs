@@ -66,7 +66,7 @@ pub struct upt_input {
     /// the mesh's frame, which goes with the support, but `gravity`, which is the world's then; the body feels the support's motion as inertia. Pass it in every step; a
     /// support that goes farther than 40 mm or half a radian in a step is put there.
     pub support_position: [f32; 3],
-    /// `R` as a unit quaternion x, y, z, w; all zero: there is no support that moves.
+    /// `R` as a unit quaternion x, y, z, w; all zero is no rotation. Position and rotation all zero: there is no support that moves.
     pub support_rotation: [f32; 4],
     /// Zero.
     pub reserved_end: [u8; 4],

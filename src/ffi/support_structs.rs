@@ -14,7 +14,7 @@ pub struct upt_support {
     pub group: u32,
     /// As a rigid body in the mesh's frame: a node `x` of the group ends at `R x + position`, mm; at most 40 mm from where it is.
     pub position: [f32; 3],
-    /// `R` as a unit quaternion x, y, z, w; all zero: none.
+    /// `R` as a unit quaternion x, y, z, w; all zero is no rotation.
     pub rotation: [f32; 4],
     /// 1: the group holds nothing, and its nodes move as all free ones do. Held again, it holds them where they are then. 0: it holds.
     pub let_go: u8,

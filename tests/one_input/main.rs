@@ -308,3 +308,72 @@ fn frames_count_from_the_time_of_the_last_step() {
     assert_eq!(unsafe { upt_scene_reset(timed.scene) }, UPT_OK);
     frame(&timed, &upt_input::NOTHING, 0.0);
 }
+
+/// A rotation that was never set turns nothing, wherever the ABI has one: instruments, what holds the body, hands. (Groups: `the_c_interface_moves_groups`.)
+#[test]
+fn a_rotation_of_zeros_is_the_identity() {
+    let identity = [0.0, 0.0, 0.0, 1.0];
+    let quarter = [0.0, 0.0, 0.5f32.sqrt(), 0.5f32.sqrt()];
+    let [zeros, same, turned] = [[0.0; 4], identity, quarter].map(|rotation| {
+        let host = Host::new(BUNDLE, |options| {
+            awake(options);
+            options.corrections.mode = UPT_CORRECTIONS_COUNT;
+            options.corrections.count = 8;
+        });
+        let blade = upt_instrument {
+            shape: UPT_SHAPE_BOX,
+            half_extents: [1.0, 4.0, 3.0],
+            rotation,
+            ..ball(&host, 1.0)
+        };
+        let tools = [blade];
+        let input = upt_input {
+            support_position: [0.5, 0.0, 0.2],
+            support_rotation: rotation,
+            ..upt_input::of_instruments(&tools)
+        };
+        let mut hand = null_mut();
+        // SAFETY: zeros are a value of this struct.
+        let mut options: upt_haptics_options = unsafe { std::mem::zeroed() };
+        options.struct_size = size_of::<upt_haptics_options>() as u32;
+        let mut above = blade;
+        above.position[2] += 5.0;
+        options.tool = &above;
+        options.step_latency_ms = 1.0;
+        let made = unsafe { upt_haptics_create(host.scene, &options, &mut hand) };
+        assert_eq!(made, UPT_OK, "{}", message());
+        let mut felt = Vec::new();
+        let mut states = Vec::new();
+        for t in 0..4 {
+            states.push(step(&host, &input));
+            // At 1 kHz, from above.
+            for k in 0..50 {
+                let mut now = blade;
+                now.position[2] += 5.0 - f32::min(0.1 * (50 * t + k) as f32, 5.0);
+                felt = render(hand, 0.05 * f64::from(t) + 1e-3 * f64::from(k), &now);
+            }
+        }
+        assert_eq!(unsafe { upt_haptics_destroy(hand) }, UPT_OK);
+        assert!(felt.iter().any(|&bits| f32::from_bits(bits) != 0.0));
+        states.push(felt);
+        states
+    });
+    assert_eq!(zeros, same);
+    for (step, (a, b)) in zeros.iter().zip(&turned).enumerate() {
+        assert_ne!(a, b, "{step}");
+    }
+}
+
+/// Force and torque of a hand that has its tool where this one is.
+fn render(hand: *mut upt_haptics, time_s: f64, tool: &upt_instrument) -> Vec<u32> {
+    // SAFETY: zeros are a value of these structs.
+    let mut pose: upt_haptic_pose = unsafe { std::mem::zeroed() };
+    pose.struct_size = size_of::<upt_haptic_pose>() as u32;
+    (pose.time_s, pose.rotation) = (time_s, tool.rotation);
+    pose.position_m = tool.position.map(|mm| 1e-3 * mm);
+    let mut force: upt_haptic_force = unsafe { std::mem::zeroed() };
+    force.struct_size = size_of::<upt_haptic_force>() as u32;
+    let told = unsafe { upt_haptics_render(hand, &pose, &mut force) };
+    assert_eq!(told, UPT_OK, "{}", message());
+    bits(&[force.force_n, force.torque_n_m].concat())
+}

@@ -665,7 +665,7 @@ namespace Upt.Interop
         /// support that goes farther than 40 mm or half a radian in a step is put there.
         /// </summary>
         public fixed float support_position[3];
-        /// <summary>`R` as a unit quaternion x, y, z, w; all zero: there is no support that moves.</summary>
+        /// <summary>`R` as a unit quaternion x, y, z, w; all zero is no rotation. Position and rotation all zero: there is no support that moves.</summary>
         public fixed float support_rotation[4];
         /// <summary>Zero.</summary>
         public fixed byte reserved_end[4];
@@ -933,7 +933,7 @@ namespace Upt.Interop
         public uint group;
         /// <summary>As a rigid body in the mesh's frame: a node `x` of the group ends at `R x + position`, mm; at most 40 mm from where it is.</summary>
         public fixed float position[3];
-        /// <summary>`R` as a unit quaternion x, y, z, w; all zero: none.</summary>
+        /// <summary>`R` as a unit quaternion x, y, z, w; all zero is no rotation.</summary>
         public fixed float rotation[4];
         /// <summary>1: the group holds nothing, and its nodes move as all free ones do. Held again, it holds them where they are then. 0: it holds.</summary>
         public byte let_go;
