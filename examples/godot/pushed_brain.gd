@@ -14,7 +14,6 @@
 #   --check             assert what was shown; exit code 1 and a line FAILED when something is wrong
 extends Node3D
 
-const SPATULA := 2
 const DEPTH := 0.012
 # Of the whole blade, mm; its edges are rounded.
 const HALF_EXTENTS := Vector3(6.0, 12.0, 1.0)
@@ -23,7 +22,6 @@ const PERIOD := 2.0
 const LATER := 0.05
 const BREATH := 4.0
 # A gall bladder, mm, on its bed: N/m and mN of all ties; and how fast it is drawn off, m/s.
-const BALL := 4
 const BLADDER := 9.0
 const BED_RADIUS := 15.0
 const BED_STIFFNESS := 300.0
@@ -124,7 +122,7 @@ func _process(delta: float) -> void:
 	if options.has("bed"):
 		var drawn := DRAWN * maxf(now - DRAWN_AFTER, 0.0)
 		pose = Transform3D(Basis(), site + outward * (0.001 * BLADDER + 0.0005 + drawn) + Vector3.UP * height)
-		tissue.press(BALL, pose.origin, Quaternion(), Vector3.ZERO, BLADDER)
+		tissue.press_sphere(pose.origin, BLADDER)
 		if ties == 0:
 			ties = tissue.hang(site, BED_RADIUS, BED_STIFFNESS, BED_STRENGTH)
 		if now < DRAWN_AFTER:
@@ -135,7 +133,7 @@ func _process(delta: float) -> void:
 			finish("could not lead: " + tissue.message())
 			return
 	else:
-		tissue.press(SPATULA, pose.origin, pose.basis.get_rotation_quaternion(), HALF_EXTENTS, ROUNDING)
+		tissue.press_spatula(pose.origin, pose.basis.get_rotation_quaternion(), HALF_EXTENTS, ROUNDING)
 	spatula.transform = pose
 	var started := Time.get_ticks_usec()
 	if not tissue.frame(now):

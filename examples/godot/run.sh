@@ -81,6 +81,8 @@ installed() {
 export -f installed
 export build godot
 check addon bash -ec installed
+cp "$here/shapes.gd" "$project/"
+check shapes "$godot" --headless --path "$project" --script shapes.gd -- "$bundles/liver-coarse"
 # A frame waits for the step that runs beside it, so that every machine shows the same.
 check headless "$godot" --headless --path "$project" --fixed-fps 60 -- --bundle="$bundle" --seconds=2.5 --wait --check
 

@@ -9,7 +9,6 @@
 #include "soft_tissue.hpp"
 #include "godot_api.h"
 
-#include <cstring>
 #include <exception>
 #include <memory>
 #include <string>
@@ -74,34 +73,6 @@ static void faces(void *instance, const GDExtensionConstTypePtr *, GDExtensionTy
   });
 }
 
-/// Where the tool is from now on: its shape (0 capsule, 1 box, 2 spatula, 4 sphere), place (m) and
-/// rotation; half its lengths and the radius of its rounding in mm.
-static void press(void *instance, const GDExtensionConstTypePtr *arguments,
-                  GDExtensionTypePtr result) {
-  const upt_instrument &hold = static_cast<SoftTissue *>(instance)->hold;
-  const auto *position = static_cast<const float *>(arguments[1]),
-             *rotation = static_cast<const float *>(arguments[2]),
-             *extents = static_cast<const float *>(arguments[3]);
-  const float half = 0.70710678f;
-  put(result, opened(instance, [&](Tissue &tissue) {
-        upt_instrument &tool = tissue.tool;
-        tool = hold;
-        tool.shape = static_cast<upt_shape>(*static_cast<const int64_t *>(arguments[0]));
-        tool.position[0] = position[0] / METRES;
-        tool.position[1] = -position[2] / METRES;
-        tool.position[2] = position[1] / METRES;
-        /* Godot's axes are RAS turned by -90 degrees about x: q_ras = turn * q, turn = (sin 45, 0,
-         * 0, cos 45). */
-        tool.rotation[0] = half * rotation[3] + half * rotation[0];
-        tool.rotation[1] = half * rotation[1] - half * rotation[2];
-        tool.rotation[2] = half * rotation[2] + half * rotation[1];
-        tool.rotation[3] = half * rotation[3] - half * rotation[0];
-        std::memcpy(tool.half_extents, extents, sizeof tool.half_extents);
-        tool.radius = static_cast<float>(real(arguments[4]));
-        tissue.in_hand = true;
-      }));
-}
-
 /// What holds the organ goes up and down from now on: by the amplitude (m), once a period (s). An
 /// amplitude of 0 ends it.
 static void breathe(void *instance, const GDExtensionConstTypePtr *arguments,
@@ -109,22 +80,6 @@ static void breathe(void *instance, const GDExtensionConstTypePtr *arguments,
   put(result, opened(instance, [&](Tissue &tissue) {
         tissue.breathe(static_cast<float>(real(arguments[0])) / METRES, real(arguments[1]));
       }));
-}
-
-/// How the tool of the next presses holds the tissue: Coulomb's coefficient; whether it grasps; the
-/// pull at which a grasp tears off, mN, 0: never.
-static void hold(void *instance, const GDExtensionConstTypePtr *arguments,
-                 GDExtensionTypePtr result) {
-  upt_instrument &hold = static_cast<SoftTissue *>(instance)->hold;
-  hold.friction = static_cast<float>(real(arguments[0]));
-  hold.mode = *static_cast<const GDExtensionBool *>(arguments[1]) ? UPT_MODE_GRASP : UPT_MODE_SLIDE;
-  hold.tear_off_mn = static_cast<float>(real(arguments[2]));
-  put(result, true);
-}
-
-/// The tool leaves the tissue.
-static void release(void *instance, const GDExtensionConstTypePtr *, GDExtensionTypePtr result) {
-  put(result, opened(instance, [](Tissue &tissue) { tissue.in_hand = false; }));
 }
 
 /// Makes the surface of this moment by a clock of your own, s, and the next step, which runs on a
@@ -248,8 +203,8 @@ static void message(void *instance, const GDExtensionConstTypePtr *, GDExtension
   godot.string_new(result, static_cast<SoftTissue *>(instance)->message.c_str());
 }
 
-/// A tissue whose surface follows tools: `open` a bundle, say where the tool is with `press`, and
-/// call `frame` and `vertices` in each `_process`.
+/// A tissue whose surface follows tools: `open` a bundle, say where the tool is with `press_sphere`
+/// or another shape, and call `frame` and `vertices` in each `_process`.
 static GDExtensionObjectPtr create_instance(void *) {
   GodotStringName parent, name;
   GDExtensionObjectPtr object;
@@ -271,15 +226,28 @@ static const GodotMethod METHODS[] = {
     {"open", open_bundle, T(BOOL), 1, {{"bundle", T(STRING)}}},
     {"rest", rest, T(PACKED_VECTOR3_ARRAY), 0, {}},
     {"faces", faces, T(PACKED_INT32_ARRAY), 0, {}},
-    {"press",
-     press,
+    {"press_sphere", press_sphere, T(BOOL), 2, {{"position", T(VECTOR3)}, {"radius", T(FLOAT)}}},
+    {"press_capsule",
+     press_capsule,
      T(BOOL),
-     5,
-     {{"shape", T(INT)},
-      {"position", T(VECTOR3)},
+     4,
+     {{"position", T(VECTOR3)},
+      {"rotation", T(QUATERNION)},
+      {"half_length", T(FLOAT)},
+      {"radius", T(FLOAT)}}},
+    {"press_box",
+     press_box,
+     T(BOOL),
+     3,
+     {{"position", T(VECTOR3)}, {"rotation", T(QUATERNION)}, {"half_extents", T(VECTOR3)}}},
+    {"press_spatula",
+     press_spatula,
+     T(BOOL),
+     4,
+     {{"position", T(VECTOR3)},
       {"rotation", T(QUATERNION)},
       {"half_extents", T(VECTOR3)},
-      {"radius", T(FLOAT)}}},
+      {"rounding", T(FLOAT)}}},
     {"hold",
      hold,
      T(BOOL),

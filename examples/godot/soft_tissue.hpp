@@ -39,9 +39,16 @@ inline double real(GDExtensionConstTypePtr argument) {
   return *static_cast<const double *>(argument);
 }
 
-// Calls of a tool that changes the body (cut_calls.cpp), and of what holds it (bed_calls.cpp).
+// Calls of the tool (tool_calls.cpp), of one that changes the body (cut_calls.cpp), and of what
+// holds it (bed_calls.cpp).
 #define UPT_CALL(name)                                                                             \
   void name(void *instance, const GDExtensionConstTypePtr *arguments, GDExtensionTypePtr result)
+UPT_CALL(press_sphere);
+UPT_CALL(press_capsule);
+UPT_CALL(press_box);
+UPT_CALL(press_spatula);
+UPT_CALL(hold);
+UPT_CALL(release);
 UPT_CALL(work_as);
 UPT_CALL(tear_at);
 UPT_CALL(undo);
