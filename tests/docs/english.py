@@ -32,7 +32,8 @@ STILTED = (
     "answer for nothing",
 )
 SOURCES = (".rs", ".py", ".h", ".hpp", ".cs", ".js", ".mjs", ".gd")
-PHRASES = re.compile(r"\b(" + "|".join(DIARY + STILTED) + r")\b", re.IGNORECASE)
+# A line may end within one.
+PHRASES = re.compile(r"\b(" + "|".join(DIARY + STILTED).replace(" ", r"\s+") + r")\b", re.IGNORECASE)
 
 
 def looked_at(path: Path) -> bool:
@@ -47,6 +48,8 @@ def faults(path: Path) -> list[str]:
     """The phrases of a page, by line."""
     if not looked_at(path):
         return []
-    lines = enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
-    found = ((number, PHRASES.search(line)) for number, line in lines)
-    return [f"{path}:{number}: '{phrase[0]}': say it plainly, and say what is" for number, phrase in found if phrase]
+    text = path.read_text(encoding="utf-8")
+    found = (
+        (text.count("\n", 0, phrase.start()) + 1, " ".join(phrase[0].split())) for phrase in PHRASES.finditer(text)
+    )
+    return [f"{path}:{number}: '{phrase}': say it plainly, and say what is" for number, phrase in found]

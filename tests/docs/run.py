@@ -19,6 +19,7 @@ import blocks
 import bundles
 import commands
 import english
+import lines
 import links
 import results
 
@@ -96,6 +97,7 @@ def main() -> int:
     for path in pages:
         tally.add(links.faults(path, known.__contains__))
         tally.add(english.faults(path))
+        tally.add(lines.faults(path))
         if path.name != "CHANGELOG.md":
             tally.add(commands.faults(path))
     sources = sorted(path for path in known if path.suffix in english.SOURCES)
