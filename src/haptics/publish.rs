@@ -192,7 +192,7 @@ impl Link {
         snapshot.delay_s = delay(published, masses);
         let modes = self.modal.rows.len();
         for (at, sample) in of.enumerate() {
-            let out = &mut snapshot.at_samples[3 * at * modes..3 * (at + 1) * modes];
+            let out = &mut snapshot.modes.at_samples[3 * at * modes..3 * (at + 1) * modes];
             out.fill(0.0);
             for (column, weight) in compliance.entries(sample) {
                 for (axis, out) in out.chunks_exact_mut(modes.max(1)).enumerate() {
@@ -206,9 +206,9 @@ impl Link {
                 }
             }
         }
-        let out = [&mut *snapshot.velocity, &mut *snapshot.drive];
+        let out = [&mut *snapshot.modes.velocity, &mut *snapshot.modes.drive];
         motion::modal(step, &mut self.carried, &mut self.modal, out)?;
-        snapshot.followed_s = motion::FOLLOWED_STEPS * step.integrator.step_s;
+        snapshot.samples.followed_s = motion::FOLLOWED_STEPS * step.integrator.step_s;
         let state = State {
             rest: step.rest,
             u: step.u,
@@ -219,7 +219,7 @@ impl Link {
             .problem
             .and_then(|problem| Some((&problem.past, problem.past.tools.get(index)?)));
         snapshot.pose = past.map(|(_, tool)| tool.pose);
-        snapshot.count = self.near.found.len();
+        snapshot.samples.count = self.near.found.len();
         for (at, &(_, row)) in self.near.found.iter().enumerate() {
             let tie = self.ties.of(row);
             let sample = self.ties.sample(&self.near.samples, row);
@@ -232,12 +232,12 @@ impl Link {
                     .binary_search_by_key(&(self.tool.instrument, row), key);
                 found.map_or_else(|_| tied::force(past, row), |at| past.forces[at].force)
             });
-            snapshot.points[at] = point;
+            snapshot.samples.points[at] = point;
             let groups = step.corrections.groups.as_slice();
             let base = |node| Vector::from(self.carried.velocity(groups, node));
-            snapshot.carried[at] = sample.gather(base);
+            snapshot.samples.carried[at] = sample.gather(base);
             let samples = &self.near.samples;
-            snapshot.facing[at] = match tie {
+            snapshot.samples.facing[at] = match tie {
                 Some(_) => Facing {
                     outward: Vector::X,
                     is_wall: false,
@@ -247,11 +247,11 @@ impl Link {
                     is_wall: samples.is_on_wall(row),
                 },
             };
-            snapshot.ties[at] = tie;
-            snapshot.forces[at] = force;
-            snapshot.anchors[at] = anchor;
+            snapshot.samples.ties[at] = tie;
+            snapshot.samples.forces[at] = force;
+            snapshot.samples.anchors[at] = anchor;
             // What the step's solve left, which the hand must not feel as a motion.
-            snapshot.errors[at] = snapshot.pose.map_or(Vector::ZERO, |pose| {
+            snapshot.samples.errors[at] = snapshot.pose.map_or(Vector::ZERO, |pose| {
                 if let Some(tie) = &tie {
                     return tied::error(tie, &pose, point, force);
                 }
@@ -264,10 +264,11 @@ impl Link {
                     put: false,
                     swept: true,
                     way_out: None,
-                    is_wall: snapshot.facing[at].is_wall,
+                    is_wall: snapshot.samples.facing[at].is_wall,
                 };
                 let pushed = force != Vector::ZERO;
-                let contact = pair.contact(point, point, snapshot.facing[at].outward, force);
+                let contact =
+                    pair.contact(point, point, snapshot.samples.facing[at].outward, force);
                 match (anchor, pushed) {
                     (Some(_), _) => contact.slip,
                     _ if contact.gap == f32::MAX => Vector::ZERO,

@@ -35,9 +35,9 @@ impl Pushed {
 
     /// As a step has left them. What the hand's forces moved since the one before is dropped: the step has it.
     pub fn begin(&mut self, snapshot: &ContactSnapshot) {
-        let count = snapshot.count;
-        self.forces[..count].copy_from_slice(&snapshot.forces[..count]);
-        self.points[..count].copy_from_slice(&snapshot.points[..count]);
+        let count = snapshot.samples.count;
+        self.forces[..count].copy_from_slice(&snapshot.samples.forces[..count]);
+        self.points[..count].copy_from_slice(&snapshot.samples.points[..count]);
         self.moved.fill(0.0);
         self.aim.fill(0.0);
     }
@@ -55,7 +55,7 @@ impl Pushed {
         if change == Vector::ZERO {
             return;
         }
-        let all = 3 * snapshot.count;
+        let all = 3 * snapshot.samples.count;
         for (axis, change) in change.to_array().into_iter().enumerate() {
             // Symmetric: a row is a column.
             let row = &snapshot.delassus[(3 * at + axis) * all..][..all];

@@ -158,8 +158,8 @@ impl Haptics {
         }
         self.follow(arrived, [&before, &now], time);
         let snapshot = self.snapshot.buffer();
-        let [mut force, mut torque] = self.contact.wrench(snapshot.count, now.translation);
-        let contacts = self.contact.pushing(snapshot.count).count() as u32;
+        let [mut force, mut torque] = self.contact.wrench(snapshot.samples.count, now.translation);
+        let contacts = self.contact.pushing(snapshot.samples.count).count() as u32;
         // A force starts from none, and goes on from the one before.
         if arrived {
             self.blend.offset = [self.blend.shown[0] - force, self.blend.shown[1] - torque];

@@ -11,7 +11,7 @@ const WHAT: &str = "a contact problem for haptics";
 /// Samples at most: what lies farther from the tool is left out.
 pub const MOST_SAMPLES: usize = 96;
 
-/// The contact problem near one tool at the end of a step. All lists have room for [`MOST_SAMPLES`], `count` are used.
+/// The contact problem near one tool at the end of a step.
 #[derive(Debug, HeldBytes)]
 pub struct ContactSnapshot {
     /// Published states so far; 0: none.
@@ -20,7 +20,17 @@ pub struct ContactSnapshot {
     pub latency_s: f64,
     /// Where the tool was in the step, if it took part.
     pub pose: Option<Pose>,
-    /// Samples.
+    pub samples: SnapshotSamples,
+    /// How samples move at once under forces on samples `[3n,3n]`, mm/mN: the compliance without the natural modes.
+    pub delassus: Vec<f32>,
+    /// Time that samples take to follow a force at once: of their mass on the spring of `delassus`, s.
+    pub delay_s: f32,
+    pub modes: SnapshotModes,
+}
+
+/// The samples near the tool. All lists have room for [`MOST_SAMPLES`], `count` are used.
+#[derive(Debug, HeldBytes)]
+pub struct SnapshotSamples {
     pub count: usize,
     /// Where they are, mm.
     pub points: Vec<Vector>,
@@ -37,17 +47,17 @@ pub struct ContactSnapshot {
     pub ties: Vec<Option<Placed>>,
     /// The step's own error: gap (x) of a touching sample, way from the anchor of a held one, a tie's length beyond what its spring explains, mm.
     pub errors: Vec<Vector>,
-    /// How samples move at once under forces on samples `[3n,3n]`, mm/mN: the compliance without the natural modes.
-    pub delassus: Vec<f32>,
-    /// Time that samples take to follow a force at once: of their mass on the spring of `delassus`, s.
-    pub delay_s: f32,
-    /// Natural modes, `m`.
-    pub modes: usize,
+}
+
+/// The natural modes, `m`.
+#[derive(Debug, HeldBytes)]
+pub struct SnapshotModes {
+    pub count: usize,
     /// The modes at the samples `[3n,m]`.
     pub at_samples: Vec<f32>,
-    /// Velocity of the modes `[m]`.
+    /// Velocity `[m]`.
     pub velocity: Vec<f32>,
-    /// What drives the modes while the forces stay `[m]`: their acceleration and damping.
+    /// What drives them while the forces stay `[m]`: their acceleration and damping.
     pub drive: Vec<f32>,
 }
 
@@ -72,21 +82,25 @@ impl ContactSnapshot {
             number: 0,
             latency_s: 0.0,
             pose: None,
-            count: 0,
-            points: vectors()?,
-            carried: vectors()?,
-            followed_s: 0.0,
-            facing: memory::filled(MOST_SAMPLES, Facing::default(), WHAT)?,
-            forces: vectors()?,
-            anchors: memory::filled(MOST_SAMPLES, None, WHAT)?,
-            ties: memory::filled(MOST_SAMPLES, None, WHAT)?,
-            errors: vectors()?,
+            samples: SnapshotSamples {
+                count: 0,
+                points: vectors()?,
+                carried: vectors()?,
+                followed_s: 0.0,
+                facing: memory::filled(MOST_SAMPLES, Facing::default(), WHAT)?,
+                forces: vectors()?,
+                anchors: memory::filled(MOST_SAMPLES, None, WHAT)?,
+                ties: memory::filled(MOST_SAMPLES, None, WHAT)?,
+                errors: vectors()?,
+            },
             delassus: memory::zeros(rows * rows, WHAT)?,
             delay_s: 0.0,
-            modes,
-            at_samples: memory::zeros(rows * modes, WHAT)?,
-            velocity: memory::zeros(modes, WHAT)?,
-            drive: memory::zeros(modes, WHAT)?,
+            modes: SnapshotModes {
+                count: modes,
+                at_samples: memory::zeros(rows * modes, WHAT)?,
+                velocity: memory::zeros(modes, WHAT)?,
+                drive: memory::zeros(modes, WHAT)?,
+            },
         })
     }
 }
@@ -100,20 +114,21 @@ mod tests {
     /// One number in every field.
     fn write(snapshot: &mut ContactSnapshot, number: u64) {
         let value = number as f32;
-        snapshot.points.fill(Vector::splat(value));
+        snapshot.samples.points.fill(Vector::splat(value));
         snapshot.delassus.fill(value);
-        snapshot.velocity.fill(value);
+        snapshot.modes.velocity.fill(value);
         snapshot.number = number;
     }
 
     fn is_whole(snapshot: &ContactSnapshot) -> bool {
         let value = snapshot.number as f32;
         snapshot
+            .samples
             .points
             .iter()
             .all(|point| *point == Vector::splat(value))
             && snapshot.delassus.iter().all(|w| *w == value)
-            && snapshot.velocity.iter().all(|v| *v == value)
+            && snapshot.modes.velocity.iter().all(|v| *v == value)
     }
 
     /// What is read while the other thread writes is of one step, whole, and never older than what was read before.

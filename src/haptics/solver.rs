@@ -89,7 +89,7 @@ impl Solver {
 
     /// Starts anew from the state of a step.
     pub fn begin(&mut self, snapshot: &ContactSnapshot) {
-        self.modes.begin(&snapshot.velocity);
+        self.modes.begin(&snapshot.modes.velocity);
         self.carried_s = 0.0;
         self.slid = false;
         self.samples.begin(snapshot);
@@ -102,22 +102,22 @@ impl Solver {
 
     /// Lets time pass for the modes and what support groups carry.
     pub fn advance(&mut self, snapshot: &ContactSnapshot, seconds: f64) {
-        self.modes.advance(seconds, &snapshot.drive);
-        self.carried_s = (self.carried_s + seconds).min(snapshot.followed_s);
+        self.modes.advance(seconds, &snapshot.modes.drive);
+        self.carried_s = (self.carried_s + seconds).min(snapshot.samples.followed_s);
     }
 
     /// Where a sample is: the step's place, what carries it, the modes, what forces have moved.
     fn place(&self, snapshot: &ContactSnapshot, at: usize) -> Vector {
-        let m = snapshot.modes;
+        let m = snapshot.modes.count;
         let axis = |k: usize| {
             let row = 3 * at + k;
             self.samples.moved[row]
                 + self
                     .modes
-                    .moved(&snapshot.at_samples[row * m..(row + 1) * m])
+                    .moved(&snapshot.modes.at_samples[row * m..(row + 1) * m])
         };
-        let carried = snapshot.carried[at] * self.carried_s as f32;
-        snapshot.points[at] + carried + Vector::new(axis(0), axis(1), axis(2))
+        let carried = snapshot.samples.carried[at] * self.carried_s as f32;
+        snapshot.samples.points[at] + carried + Vector::new(axis(0), axis(1), axis(2))
     }
 
     /// [`Pushed::follow`].
@@ -137,12 +137,12 @@ impl Solver {
         way: [&Pose; 2],
         part: f32,
     ) {
-        let pushed = !self.slid && self.pushing(snapshot.count).next().is_some();
+        let pushed = !self.slid && self.pushing(snapshot.samples.count).next().is_some();
         if pushed {
             self.before.copy_from(&self.samples);
         }
         self.solve_once(snapshot, body, friction, way, part);
-        if pushed && self.pushing(snapshot.count).next().is_none() {
+        if pushed && self.pushing(snapshot.samples.count).next().is_none() {
             self.slid = true;
             self.samples.copy_from(&self.before);
             self.solve_once(snapshot, body, friction, way, part);
@@ -153,13 +153,17 @@ impl Solver {
     fn touched_at(&self, snapshot: &ContactSnapshot, body: &Body, at: usize, now: &Pose) -> Vector {
         let point = self.place(snapshot, at);
         let pose = match &snapshot.pose {
-            Some(pose) if self.slid && snapshot.forces[at] != Vector::ZERO => pose,
+            Some(pose) if self.slid && snapshot.samples.forces[at] != Vector::ZERO => pose,
             _ => return point,
         };
-        let beside = now.transform_point(pose.inverse_transform_point(snapshot.points[at]));
+        let beside = now.transform_point(pose.inverse_transform_point(snapshot.samples.points[at]));
         let normal = body.nearest_at(now, beside).normal;
         let plane = beside + normal * (point - beside).dot(normal);
-        match (beside - snapshot.points[at]).reject_from(normal).length() <= SLIDES_MM {
+        match (beside - snapshot.samples.points[at])
+            .reject_from(normal)
+            .length()
+            <= SLIDES_MM
+        {
             true => plane,
             false => point,
         }
@@ -179,12 +183,12 @@ impl Solver {
         let (low, high) = body.bounds(now, skin.max(FADE_MM));
         self.problem.rows.clear();
         self.nearest = f32::MAX;
-        for at in 0..snapshot.count {
+        for at in 0..snapshot.samples.count {
             let pushed = self.samples.forces[at] != Vector::ZERO;
             let point = self.touched_at(snapshot, body, at, now);
             let outside = point.cmplt(low).any() || point.cmpgt(high).any();
-            let tied = snapshot.ties[at].is_some();
-            let held = snapshot.anchors[at].is_some() || tied;
+            let tied = snapshot.samples.ties[at].is_some();
+            let held = snapshot.samples.anchors[at].is_some() || tied;
             let distance = match tied || outside && !pushed && !held {
                 true => f32::MAX,
                 false => body.nearest_at(now, point).distance,
@@ -208,31 +212,31 @@ impl Solver {
             self.problem.rows.truncate(MOST_ROWS);
             self.problem.rows.sort_unstable_by_key(|row| row.1);
         }
-        let (n, all) = (self.problem.rows.len(), 3 * snapshot.count);
+        let (n, all) = (self.problem.rows.len(), 3 * snapshot.samples.count);
         self.problem.contacts.clear();
         self.problem.solved.clear();
         self.problem.w.clear();
         for &(_, at) in &self.problem.rows {
             let force = self.samples.forces[at];
-            let error = snapshot.errors[at];
+            let error = snapshot.samples.errors[at];
             let pair = Pair {
                 body,
                 friction,
                 from,
                 now,
-                anchor: snapshot.anchors[at],
+                anchor: snapshot.samples.anchors[at],
                 put: false,
                 swept: true,
                 way_out: None,
-                is_wall: snapshot.facing[at].is_wall,
+                is_wall: snapshot.samples.facing[at].is_wall,
             };
             let (point, start) = (
                 self.touched_at(snapshot, body, at, now),
                 self.samples.points[at],
             );
-            let mut contact = match &snapshot.ties[at] {
+            let mut contact = match &snapshot.samples.ties[at] {
                 Some(tie) => pulling(tie, now, point),
-                None => pair.contact(point, start, snapshot.facing[at].outward, force),
+                None => pair.contact(point, start, snapshot.samples.facing[at].outward, force),
             };
             match contact.law {
                 Law::Bound | Law::Tie(_) => contact.slip -= error,
@@ -261,23 +265,23 @@ impl Solver {
             self.samples.forces[at] = force;
             self.samples.change(snapshot, at, change, part);
         }
-        for at in 0..snapshot.count {
+        for at in 0..snapshot.samples.count {
             // A tie pulls the tool at its own end.
-            self.samples.points[at] = match &snapshot.ties[at] {
+            self.samples.points[at] = match &snapshot.samples.ties[at] {
                 Some(tie) => now.transform_point(tie.place),
                 None => self.touched_at(snapshot, body, at, now),
             };
         }
-        let m = snapshot.modes;
+        let m = snapshot.modes.count;
         self.modes.push.fill(0.0);
-        for at in 0..snapshot.count {
-            let change = self.samples.forces[at] - snapshot.forces[at];
+        for at in 0..snapshot.samples.count {
+            let change = self.samples.forces[at] - snapshot.samples.forces[at];
             if change == Vector::ZERO {
                 continue;
             }
             for (axis, change) in change.to_array().into_iter().enumerate() {
                 let row = 3 * at + axis;
-                let own = &snapshot.at_samples[row * m..(row + 1) * m];
+                let own = &snapshot.modes.at_samples[row * m..(row + 1) * m];
                 self.modes.add_push(own, change);
             }
         }
@@ -316,7 +320,7 @@ impl Solver {
                 });
             }
         }
-        let all = 3 * snapshot.count;
+        let all = 3 * snapshot.samples.count;
         self.stiffness.of(|i, j| snapshot.delassus[i * all + j])
     }
 }
@@ -344,7 +348,7 @@ mod tests {
     fn a_sample_follows_a_force_with_a_delay() {
         let mut solver = Solver::new(Modes::new(&[], 0.0).unwrap()).unwrap();
         let mut snapshot = ContactSnapshot::new(0).unwrap();
-        snapshot.count = 1;
+        snapshot.samples.count = 1;
         snapshot.delay_s = 4e-3;
         for axis in 0..3 {
             snapshot.delassus[4 * axis] = 0.02;

@@ -60,13 +60,27 @@ pub struct UptModel {
     pub precision: Precision,
     /// Bytes of `embed.onnx`, run for a mesh or points of a scene's own.
     embed: Vec<u8>,
-    /// Names and bytes of the graphs: each scene makes its stages from them.
-    pub(super) latent_file: String,
-    pub(super) latent: Vec<u8>,
-    pub(super) decoder_file: String,
-    pub(super) decoder_graph: Vec<u8>,
-    /// File and bytes of the whole step's graph, where the bundle has it in this precision.
-    pub(super) step: Option<(String, Vec<u8>)>,
+    /// The graphs that each scene makes its stages from.
+    pub(super) latent: GraphFile,
+    pub(super) decoder_graph: GraphFile,
+    /// That of the whole step, where the bundle has it in this precision.
+    pub(super) step: Option<GraphFile>,
+}
+
+/// A graph as the bundle has it.
+#[derive(HeldBytes)]
+pub(super) struct GraphFile {
+    pub name: String,
+    pub bytes: Vec<u8>,
+}
+
+impl GraphFile {
+    fn read(files: &BundleFiles, name: String) -> Result<GraphFile> {
+        Ok(GraphFile {
+            bytes: files.read(&name)?,
+            name,
+        })
+    }
 }
 
 impl UptModel {
@@ -82,7 +96,7 @@ impl UptModel {
         let latent_file = files.graph_file("latent", precision)?;
         let decoder_file = files.graph_file("decoder", precision)?;
         let step = match files.graph_file("step", precision) {
-            Ok(file) if files.has(&file) => Some((file.clone(), files.read(&file)?)),
+            Ok(file) if files.has(&file) => Some(GraphFile::read(files, file)?),
             _ => None,
         };
         let entry = files
@@ -108,10 +122,8 @@ impl UptModel {
             tables,
             embed,
             precision,
-            latent: files.read(&latent_file)?,
-            latent_file,
-            decoder_graph: files.read(&decoder_file)?,
-            decoder_file,
+            latent: GraphFile::read(files, latent_file)?,
+            decoder_graph: GraphFile::read(files, decoder_file)?,
             step,
             entry,
         };

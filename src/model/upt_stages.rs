@@ -1,6 +1,6 @@
 //! Sessions of a `upt` bundle's graphs, with the shapes of a scene's mesh.
 
-use super::upt::{UptModel, UptTables};
+use super::upt::{GraphFile, UptModel, UptTables};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::onnx::{ProviderPlan, Runtime, Stage, StageOptions, Tensors};
@@ -33,13 +33,13 @@ impl UptModel {
         let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
         Stage::new(
             runtime,
-            &self.latent_file,
-            &self.latent,
+            &self.latent.name,
+            &self.latent.bytes,
             &[("supernodes", &[supernodes, dims.encoder])],
             &[("keys", kv), ("values", kv)],
             &StageOptions {
                 threads: latent_threads(
-                    self.latent.len(),
+                    self.latent.bytes.len(),
                     supernodes.max(dims.latent_tokens),
                     threads,
                 ),
@@ -55,8 +55,8 @@ impl UptModel {
         let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
         Stage::new(
             runtime,
-            &self.decoder_file,
-            &self.decoder_graph,
+            &self.decoder_graph.name,
+            &self.decoder_graph.bytes,
             &[
                 ("queries", &[DECODER_TILE, dims.query]),
                 ("keys", kv),
@@ -83,8 +83,8 @@ impl UptModel {
         let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
         Stage::with_constants(
             runtime,
-            &self.decoder_file,
-            &self.decoder_graph,
+            &self.decoder_graph.name,
+            &self.decoder_graph.bytes,
             &Tensors {
                 inputs: &[("keys", kv), ("values", kv)],
                 constants: &[("queries", &[count, dims.query], queries)],
@@ -114,7 +114,7 @@ impl UptModel {
         threads: usize,
         tables: &UptTables,
     ) -> Result<Stage> {
-        let Some((file, bytes)) = &self.step else {
+        let Some(GraphFile { name, bytes }) = &self.step else {
             return Err(Error::Unsupported(format!(
                 "step_path: the bundle has no step graph in precision {:?}; export it with `python -m upt_training export --step`",
                 self.precision
@@ -150,7 +150,7 @@ impl UptModel {
         let padded: &[usize] = &[supernodes, degree];
         Stage::with_constants(
             runtime,
-            file,
+            name,
             bytes,
             &Tensors {
                 inputs: &[("features", &[rows, self.entry.feature_width()])],

@@ -24,10 +24,8 @@ pub struct Counters {
     pub sleeping: bool,
     /// Published frames that hold exactly rest since the scene fell asleep.
     pub rest_frames: u32,
-    /// Where the last published state came from.
-    pub source: Source,
-    /// Where the one before it came from.
-    pub source_before: Source,
+    /// Where the last published state came from, and the one before it.
+    pub sources: [Source; 2],
     /// Largest displacement of the last published state, in mm.
     pub max_displacement: f32,
     /// Whether the last published state was corrected, and the one before it.
@@ -47,8 +45,7 @@ impl Counters {
         quiet: 0,
         sleeping: false,
         rest_frames: 0,
-        source: Source::Rest,
-        source_before: Source::Rest,
+        sources: [Source::Rest; 2],
         max_displacement: 0.0,
         was_corrected: [false; 2],
         driven: false,

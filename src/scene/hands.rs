@@ -56,8 +56,7 @@ pub(super) fn stepped<'a>(
 ) -> Option<Stepped<'a>> {
     let body = &maker.body;
     Some(Stepped {
-        isa: maker.machine.isa,
-        pool: &maker.machine.pool,
+        compute: maker.machine.compute(),
         prior: body.model.prior.as_ref()?,
         corrections: body.model.corrections().ok()?,
         motion: &maker.corrected.as_ref()?.solver.motion,

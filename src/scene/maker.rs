@@ -231,8 +231,8 @@ impl StepMaker {
         let kept = self.keeps_all_nodes();
         let states = &mut self.states;
         let (source, contact) = match which {
-            Which::Last => (states.counters.source, &states.contact),
-            Which::Next | Which::Before => (states.counters.source_before, &states.contact_before),
+            Which::Last => (states.counters.sources[0], &states.contact),
+            Which::Next | Which::Before => (states.counters.sources[1], &states.contact_before),
         };
         let shared = lock_read(published);
         let frame = if which == Which::Last {

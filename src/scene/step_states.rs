@@ -59,11 +59,11 @@ impl StepStates {
     pub fn commit(&mut self, replaced: bool) {
         let counters = &mut self.counters;
         counters.was_corrected = [self.next_corrected && !replaced, counters.was_corrected[0]];
-        counters.source_before = counters.source;
-        counters.source = match replaced {
+        let source = match replaced {
             true => Source::Fallback,
             false => Source::Model,
         };
+        counters.sources = [source, counters.sources[0]];
         std::mem::swap(&mut self.contact_before, &mut self.contact);
         std::mem::swap(&mut self.contact, &mut self.incoming);
     }
@@ -71,8 +71,7 @@ impl StepStates {
     /// `next` becomes exactly rest, made by nothing.
     pub fn rest_next(&mut self) {
         self.counters.was_corrected = [false; 2];
-        self.counters.source_before = Source::Rest;
-        self.counters.source = Source::Rest;
+        self.counters.sources = [Source::Rest; 2];
         self.next.field.fill(0.0);
         self.next.points.fill(0.0);
     }

@@ -38,14 +38,9 @@ RECORDS = {
 LARGER: dict[str, tuple[int, int]] = {
     "bundle::Mesh": (15, 12),
     "upt::Between": (18, 5),
-    "upt::ContactSnapshot": (18, 1),
-    "upt::Counters": (11, 0),
     "upt::Model": (18, 20),
     "upt::Published": (12, 8),
     "upt::Scene": (7, 64),
-    "upt::Stepped": (11, 0),
-    "upt::UptEngine": (13, 15),
-    "upt::UptModel": (12, 8),
 }
 
 TOKEN = re.compile(

@@ -101,7 +101,7 @@ pub(super) fn modal(
                 }),
             };
         }
-        let (isa, pool, q) = (step.isa, step.pool, &mut *room.coordinates);
+        let (isa, pool, q) = (step.compute.isa, step.compute.pool, &mut *room.coordinates);
         project_field(isa, pool, &step.prior.basis(), &room.starts, &room.field, q)?;
         row_dots(
             isa,

@@ -2,13 +2,12 @@
 
 use crate::contact::ContactProblem;
 use crate::corrections::{Corrections, Integrator, Motion};
-use crate::kernels::{Isa, Pool};
+use crate::kernels::Compute;
 use crate::prior::PriorTable;
 
 /// A published state.
 pub struct Stepped<'a> {
-    pub isa: Isa,
-    pub pool: &'a Pool,
+    pub compute: Compute<'a>,
     pub prior: &'a PriorTable,
     pub corrections: &'a Corrections,
     pub motion: &'a Motion,

@@ -3,7 +3,7 @@
 use super::decoders::{Decoders, decode_resident, decode_tiles, take_rows};
 use std::sync::Arc;
 
-use super::{Path, UptEngine, UptRecord};
+use super::{NativeDecoder, Path, UptEngine, UptRecord};
 use crate::error::Result;
 use crate::kernels::Compute;
 use crate::kernels::decoder::{DecoderRows, Decoding, decode};
@@ -69,16 +69,20 @@ impl UptEngine {
             let width = self.kind.entry.dims.query;
             return decode_tiles(stages, compute.pool, width, record, queries, rows, out);
         }
-        self.tokens
-            .set(self.precision, &record.keys, &record.values);
+        let NativeDecoder {
+            precision,
+            tokens,
+            scratch,
+        } = &mut self.native;
+        tokens.set(*precision, &record.keys, &record.values);
         let what = Decoding {
             decoder: &self.kind.decoder,
-            precision: self.precision,
-            tokens: &self.tokens,
+            precision: *precision,
+            tokens,
             queries,
             rows: DecoderRows::Scatter(rows),
         };
-        Ok(decode(compute, what, &mut self.decoder_scratch, out)?)
+        Ok(decode(compute, what, scratch, out)?)
     }
 }
 

@@ -67,22 +67,26 @@ pub struct UptEngine {
     /// The linear response; none where the network does not use it.
     pub linear: Option<Linear>,
     path: Path,
-    /// Keys and values of the latent state that is decoded, packed for the native decoder, and its scratch.
-    tokens: DecoderTokens,
-    decoder_scratch: DecoderScratch,
+    native: NativeDecoder,
     decoders: Decoders,
     /// The nodes that the network decodes for the others to be interpolated from, where the bundle has anchors.
     anchors: AnchorField,
-    #[held(skip)]
-    precision: DecoderPrecision,
-    #[held(skip)]
-    graphs: Precision,
     /// The step being made.
     pub next: UptRecord,
     /// Last published.
     pub last: UptRecord,
     /// The one before.
     pub before: UptRecord,
+}
+
+/// What the native decoder works in.
+#[derive(HeldBytes)]
+struct NativeDecoder {
+    #[held(skip)]
+    precision: DecoderPrecision,
+    /// Keys and values of the latent state that is decoded, packed for it.
+    tokens: DecoderTokens,
+    scratch: DecoderScratch,
 }
 
 const STATES: &str = "a scene's latent states";
@@ -132,12 +136,18 @@ impl UptEngine {
             tables: Arc::clone(tables),
             linear: table.map(Linear::new).transpose()?,
             path,
-            tokens: DecoderTokens::try_new(&kind.decoder, dims.latent_tokens)?,
-            decoder_scratch: DecoderScratch::try_new(
-                &kind.decoder,
-                dims.latent_tokens,
-                pool.threads(),
-            )?,
+            native: NativeDecoder {
+                precision: match choice.precision {
+                    Precision::Bf16 => DecoderPrecision::fastest_bf16(),
+                    _ => DecoderPrecision::F32,
+                },
+                tokens: DecoderTokens::try_new(&kind.decoder, dims.latent_tokens)?,
+                scratch: DecoderScratch::try_new(
+                    &kind.decoder,
+                    dims.latent_tokens,
+                    pool.threads(),
+                )?,
+            },
             decoders: Decoders::new(model, kind, tables, choice.kernel, threads)?,
             anchors: tables
                 .anchors
@@ -145,12 +155,6 @@ impl UptEngine {
                 .map(|anchors| AnchorField::new(anchors, node_count))
                 .transpose()?
                 .unwrap_or_default(),
-            precision: if choice.precision == Precision::Bf16 {
-                DecoderPrecision::fastest_bf16()
-            } else {
-                DecoderPrecision::F32
-            },
-            graphs: kind.precision,
             next: record()?,
             last: record()?,
             before: record()?,
@@ -159,9 +163,9 @@ impl UptEngine {
 
     /// Precision that the decoder runs in.
     pub fn precision(&self) -> Precision {
-        match self.precision {
+        match self.native.precision {
             _ if self.path() == StepPath::Whole || self.kernel() != DecoderKernel::Native => {
-                self.graphs
+                self.kind.precision
             }
             DecoderPrecision::Bf16Vectors | DecoderPrecision::Bf16Tiles => Precision::Bf16,
             DecoderPrecision::F32 => Precision::F32,
