@@ -36,7 +36,7 @@ impl Scene {
             return Err(Error::NonFinite(format!("the place {place}")));
         }
         let shared = lock_read(&self.shared.published);
-        if shared.cut.is_some() {
+        if shared.body.cut.is_some() {
             return Err(super::body::refused("ties"));
         }
         let (rest, u) = (&self.mesh.positions, &shared.last.field);
@@ -64,7 +64,7 @@ impl Scene {
             )));
         }
         let shared = lock_read(&self.shared.published);
-        if shared.cut.is_some() {
+        if shared.body.cut.is_some() {
             return Err(super::body::refused("a bed"));
         }
         let (rest, u) = (&mesh.positions, &shared.last.field);

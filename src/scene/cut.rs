@@ -16,7 +16,7 @@ use super::counters::Counters;
 use super::cut_motion::spread;
 use super::cut_state::CutState;
 use super::maker::StepMaker;
-use super::published::{BodyNumber, CutModel, Frame, Published};
+use super::published::{BodyNumber, CutModel, Frame, Published, ShownBody, ShownContact};
 use super::published::{SCENE, lock_read, lock_write};
 use crate::contact::ContactReport;
 use crate::error::{Error, Result};
@@ -37,12 +37,16 @@ impl Published {
             earlier: is_cubic.then(|| Frame::rest(count)).transpose()?,
             region: None,
             stats: core.blank_stats(),
-            contact_nodes: memory::room(count, SCENE)?,
-            contact_vectors: memory::room(3 * count, SCENE)?,
+            contact: ShownContact {
+                nodes: memory::room(count, SCENE)?,
+                vectors: memory::room(3 * count, SCENE)?,
+            },
             tools: Default::default(),
             frame_state: None,
-            cut: (body.cut.as_ref()).map(|_| CutModel(Arc::clone(&body.model))),
-            body: BodyNumber::default(),
+            body: ShownBody {
+                number: BodyNumber::default(),
+                cut: (body.cut.as_ref()).map(|_| CutModel(Arc::clone(&body.model))),
+            },
             attached: Arc::default(),
         })
     }
@@ -103,8 +107,8 @@ impl Core {
         told.take(&lock_read(published).tools)?;
         next.maker.follow(&self.maker, source)?;
         next.maker.loads.push(&next.maker.body, &change.pushes)?;
-        let before = lock_read(published).body;
-        shown.body = BodyNumber {
+        let before = lock_read(published).body.number;
+        shown.body.number = BodyNumber {
             change: before.change + 1,
             ..before
         };
@@ -172,8 +176,8 @@ impl Core {
         shown: Published,
     ) -> Result<()> {
         let mut shown = self.hand_over(published, &mut next, shown)?;
-        let before = lock_read(published).body;
-        shown.body = BodyNumber {
+        let before = lock_read(published).body.number;
+        shown.body.number = BodyNumber {
             line: before.line + 1,
             change: before.change + 1,
         };

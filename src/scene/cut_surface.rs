@@ -68,7 +68,7 @@ impl Scene {
     pub fn update_surface(&self) -> Result<SurfaceUpdate> {
         let mut held = lock(&self.tools.surface)?;
         self.with(|core, published| {
-            let body = lock_read(published).body;
+            let body = lock_read(published).body.number;
             let (first_vertex, is_new) = match &mut *held {
                 Some(own) if own.is_of(body) => {
                     own.changed.clear();
@@ -160,7 +160,7 @@ impl Scene {
 impl Followed {
     /// Whether it is the surface of the body that is shown, with all its nodes, and an output of `len` floats has its size.
     fn check(&self, shown: &Published, len: usize) -> Result<()> {
-        if !self.is_of(shown.body) {
+        if !self.is_of(shown.body.number) {
             return Err(Error::State(
                 "surface: the body has changed since its surface was updated; update it first"
                     .into(),

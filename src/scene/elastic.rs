@@ -43,10 +43,10 @@ impl Haptics {
     ) -> Result<()> {
         let shared = lock_read(published);
         if shared.region.is_none() {
-            let (field, nodes) = (&shared.last.field, &shared.contact_nodes);
+            let (field, nodes) = (&shared.last.field, &shared.contact.nodes);
             return self.forces.reaction(field, nodes, out).map(|_| ());
         }
-        memory::replace(&mut self.nodes, &shared.contact_nodes, WHAT)?;
+        memory::replace(&mut self.nodes, &shared.contact.nodes, WHAT)?;
         drop(shared);
         self.around.clear();
         (self.forces).neighbourhood(&self.nodes, &mut self.around)?;

@@ -70,7 +70,7 @@ impl Scene {
             }),
         };
         let published = lock_read(&self.shared.published);
-        if published.cut.is_some() {
+        if published.body.cut.is_some() {
             return Err(super::body::refused("contacts from instruments"));
         }
         let step = Some(published.stats.step_count);

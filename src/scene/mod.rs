@@ -197,7 +197,7 @@ impl Scene {
 
     /// Back to rest; region and points stay.
     pub fn reset(&self) -> Result<()> {
-        let _frames = self.hold_frames(lock_read(&self.shared.published).cut.is_some())?;
+        let _frames = self.hold_frames(lock_read(&self.shared.published).body.cut.is_some())?;
         let line = |recorder: &mut Recorder| recorder.open(&Line::Reset {});
         self.told(line, |core, published| {
             core.reset(published)?;
@@ -371,7 +371,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Snapshot`] when it is damaged or of another model or mesh, [`Error::Version`].
     pub fn restore(&self, bytes: &[u8]) -> Result<()> {
-        let is_cut = lock_read(&self.shared.published).cut.is_some();
+        let is_cut = lock_read(&self.shared.published).body.cut.is_some();
         let _frames = self.hold_frames(is_cut || snapshot::has_body(bytes))?;
         let line = Line::Restore(Bytes(Cow::Borrowed(bytes)));
         let line = |recorder: &mut Recorder| recorder.open(&line);

@@ -80,7 +80,7 @@ impl Scene {
             View::Surface => Some(self.surface_points(out.len())?),
         };
         // While frames are held no body changes.
-        let cut = lock_read(&self.shared.published).cut.clone();
+        let cut = lock_read(&self.shared.published).body.cut.clone();
         let model = cut.as_ref().map_or(&self.model, |cut| &cut.0);
         let mesh = cut.as_ref().map_or(&self.mesh, |cut| &cut.0.mesh);
         let tissue = Tissue {

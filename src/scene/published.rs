@@ -92,6 +92,23 @@ impl std::fmt::Debug for CutModel {
     }
 }
 
+/// Contact at nodes in the last step.
+#[derive(Debug)]
+pub struct ShownContact {
+    /// In the host's order.
+    pub nodes: Vec<u32>,
+    /// `[m,3]`, mm.
+    pub vectors: Vec<f32>,
+}
+
+/// The body of the published states.
+#[derive(Debug)]
+pub struct ShownBody {
+    pub number: BodyNumber,
+    /// Its model, where it has been cut.
+    pub cut: Option<CutModel>,
+}
+
 /// The published part of a scene.
 #[derive(Debug)]
 pub struct Published {
@@ -105,18 +122,13 @@ pub struct Published {
     pub region: Option<Vec<u32>>,
     /// Statistics of the last step.
     pub stats: SceneStats,
-    /// Contact nodes of the last step in the host's order.
-    pub contact_nodes: Vec<u32>,
-    /// `[m,3]`, mm.
-    pub contact_vectors: Vec<f32>,
+    pub contact: ShownContact,
     /// What the tools of the last step were told, and the samples that push them.
     pub tools: crate::contact::ContactReport,
     /// What frames between steps are made of, from the first that a host asks for.
     pub frame_state: Option<super::frame_state::FrameState>,
-    /// The model of the body, where it has been cut.
-    pub cut: Option<CutModel>,
-    /// Which body they are states of.
-    pub body: BodyNumber,
+    /// The body that they are states of.
+    pub body: ShownBody,
     /// The attached points.
     pub attached: std::sync::Arc<super::points::AttachedPoints>,
 }

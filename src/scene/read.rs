@@ -99,6 +99,6 @@ impl Scene {
     /// Nodes in contact in the last step, in the host's order, and `[m,3]` their displacements, mm.
     pub fn last_contacts(&self) -> Result<(Vec<u32>, Vec<f32>)> {
         let shared = lock_read(&self.shared.published);
-        Ok((shared.contact_nodes.clone(), shared.contact_vectors.clone()))
+        Ok((shared.contact.nodes.clone(), shared.contact.vectors.clone()))
     }
 }

@@ -87,14 +87,14 @@ impl StepStates {
 
     /// The last step's contacts in the host's order.
     pub fn show_contacts(&self, shared: &mut Published) {
-        shared.contact_nodes.clear();
-        shared.contact_vectors.clear();
-        shared.contact_nodes.resize(self.contact.len(), 0);
-        shared.contact_vectors.resize(3 * self.contact.len(), 0.0);
+        shared.contact.nodes.clear();
+        shared.contact.vectors.clear();
+        shared.contact.nodes.resize(self.contact.len(), 0);
+        shared.contact.vectors.resize(3 * self.contact.len(), 0.0);
         for (i, &at) in self.contact.order.iter().enumerate() {
             let at = at as usize;
-            shared.contact_nodes[at] = self.contact.nodes[i];
-            shared.contact_vectors[3 * at..3 * at + 3]
+            shared.contact.nodes[at] = self.contact.nodes[i];
+            shared.contact.vectors[3 * at..3 * at + 3]
                 .copy_from_slice(&self.contact.vectors[3 * i..3 * i + 3]);
         }
     }

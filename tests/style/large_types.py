@@ -39,7 +39,6 @@ LARGER: dict[str, tuple[int, int]] = {
     "bundle::Mesh": (15, 12),
     "upt::Between": (18, 5),
     "upt::Model": (18, 20),
-    "upt::Published": (12, 8),
     "upt::Scene": (7, 64),
 }
 
