@@ -3,10 +3,11 @@
 //! It shares files and runtime with the model of the intact body, and has a mesh, a linear response, corrections and touchable samples of its own. The
 //! learned part knows the intact body alone and is off.
 
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, OnceLock};
 
 use topology::{Body, RestMesh};
 
+use super::made::MadeOnce;
 use super::{KindModel, Model, ReducedModel};
 use crate::error::{Error, Result};
 use crate::library::Alive;
@@ -17,12 +18,12 @@ impl Model {
     /// # Errors
     /// [`Error::OutOfMemory`].
     pub(crate) fn rest_mesh(&self) -> Result<Arc<RestMesh>> {
-        if let Some(made) = self.rest.get() {
+        if let Some(made) = self.made.rest.get() {
             return Ok(Arc::clone(made));
         }
         let mesh = &self.mesh;
         let made = RestMesh::new(mesh.positions.as_chunks().0, mesh.tets.as_chunks().0)?;
-        Ok(Arc::clone(self.rest.get_or_init(|| Arc::new(made))))
+        Ok(Arc::clone(self.made.rest.get_or_init(|| Arc::new(made))))
     }
 
     /// The model of a body that this one's has been cut to; this is that of the intact body.
@@ -49,17 +50,12 @@ impl Model {
             mesh: Arc::new(mesh),
             prior: Some(Arc::new(own)),
             kind: KindModel::Reduced(Arc::new(ReducedModel { learned: None })),
-            corrections: OnceLock::from(corrections),
-            samples: OnceLock::new(),
-            rest: OnceLock::new(),
-            opening: Mutex::new(()),
+            made: MadeOnce {
+                corrections: OnceLock::from(corrections),
+                ..MadeOnce::default()
+            },
             files: Arc::clone(&self.files),
-            runtime: self.runtime,
-            plan: self.plan.clone(),
-            threads: self.threads,
-            isa: self.isa,
-            precision: self.precision,
-            choice: self.choice.clone(),
+            execution: self.execution.clone(),
             load_seconds: self.load_seconds,
             _alive: Alive::new(),
         }))

@@ -2,7 +2,9 @@
 
 mod anchors;
 mod cut;
+mod execution;
 mod info;
+mod made;
 mod portable;
 mod precision;
 mod reduced;
@@ -14,10 +16,12 @@ mod upt_stages;
 use crate::clock::Instant;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 pub use anchors::Anchors;
+pub(crate) use execution::Execution;
 pub use info::{Kind, ModelInfo};
+use made::MadeOnce;
 pub use reduced::{LearnedMap, ReducedModel};
 pub use upt::{UptModel, UptTables};
 pub use upt_stages::DECODER_TILE;
@@ -26,10 +30,10 @@ use crate::bundle::{BundleFiles, Manifest, ManifestKind, Mesh, NodeSet, Place};
 use crate::corrections::Corrections;
 use crate::error::Result;
 use crate::features::HAS_INSTRUMENTS;
-use crate::kernels::{FlushToZero, Isa};
+use crate::kernels::FlushToZero;
 use crate::library::{self, Alive};
 use crate::memory::HeldBytes;
-use crate::onnx::{ProviderChoice, ProviderPlan, Runtime};
+use crate::onnx::{ProviderPlan, Runtime};
 use crate::options::{IndexSet, ModelOptions, Precision, Provider};
 use crate::prior::PriorTable;
 
@@ -57,20 +61,9 @@ pub struct Model {
     /// The kind's own part.
     #[doc(hidden)]
     pub kind: KindModel,
-    corrections: OnceLock<Box<Corrections>>,
-    samples: OnceLock<Arc<::contact::Samples>>,
-    /// The mesh as what can be cut, from the first time that a scene asks for it.
-    rest: OnceLock<Arc<topology::RestMesh>>,
-    opening: Mutex<()>,
+    made: MadeOnce,
     files: Arc<BundleFiles>,
-    /// ONNX Runtime; none where the bundle has no graph.
-    runtime: Option<&'static Runtime>,
-    pub(crate) plan: ProviderPlan,
-    pub(crate) threads: usize,
-    /// Of all kernels of its scenes.
-    pub(crate) isa: Isa,
-    pub(crate) precision: Precision,
-    choice: ProviderChoice,
+    pub(crate) execution: Execution,
     load_seconds: f64,
     _alive: Alive,
 }
@@ -198,20 +191,19 @@ impl Model {
         };
         let model = Model {
             hash: files.hash,
-            corrections: OnceLock::new(),
-            samples: OnceLock::new(),
-            rest: OnceLock::new(),
-            opening: Mutex::new(()),
+            made: MadeOnce::default(),
             files,
             mesh: Arc::new(mesh),
             prior,
             kind,
-            runtime,
-            plan,
-            threads,
-            isa,
-            precision: options.precision.unwrap_or(Precision::F32),
-            choice,
+            execution: Execution {
+                runtime,
+                plan,
+                choice,
+                threads,
+                isa,
+                precision: options.precision.unwrap_or(Precision::F32),
+            },
             load_seconds: start.elapsed().as_secs_f64(),
             manifest,
             _alive: Alive::new(),
@@ -227,15 +219,24 @@ impl Model {
     /// [`crate::Error::Bundle`] for their file.
     #[doc(hidden)]
     pub fn corrections(&self) -> Result<&Corrections> {
-        let _opening = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(made) = self.corrections.get() {
+        let _opening = self
+            .made
+            .opening
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if let Some(made) = self.made.corrections.get() {
             return Ok(made);
         }
-        let _mode = FlushToZero::of_portable(self.isa);
-        let made = Corrections::open(&self.files, &self.mesh, self.prior.as_deref(), self.isa)
-            .and_then(|made| crate::memory::boxed(made, "the corrections"))
-            .map_err(|error| self.files.name_maker(error))?;
-        Ok(self.corrections.get_or_init(|| made))
+        let _mode = FlushToZero::of_portable(self.execution.isa);
+        let made = Corrections::open(
+            &self.files,
+            &self.mesh,
+            self.prior.as_deref(),
+            self.execution.isa,
+        )
+        .and_then(|made| crate::memory::boxed(made, "the corrections"))
+        .map_err(|error| self.files.name_maker(error))?;
+        Ok(self.made.corrections.get_or_init(|| made))
     }
 
     /// Reads what corrections need for loads, at the first that a scene is given.
@@ -245,7 +246,11 @@ impl Model {
     #[doc(hidden)]
     pub fn prepare_loads(&self) -> Result<()> {
         let corrections = self.corrections()?;
-        let _opening = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        let _opening = self
+            .made
+            .opening
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         (corrections.prepare_loads(&self.files)).map_err(|error| self.files.name_maker(error))
     }
 
@@ -255,11 +260,11 @@ impl Model {
     /// [`crate::Error::OutOfMemory`].
     #[doc(hidden)]
     pub fn samples(&self) -> Result<Arc<::contact::Samples>> {
-        if let Some(made) = self.samples.get() {
+        if let Some(made) = self.made.samples.get() {
             return Ok(Arc::clone(made));
         }
         let made = Arc::new(samples::of(&self.mesh)?);
-        Ok(Arc::clone(self.samples.get_or_init(|| made)))
+        Ok(Arc::clone(self.made.samples.get_or_init(|| made)))
     }
 
     /// What the model is.
@@ -283,7 +288,7 @@ impl Model {
             supernode_count: supernodes as u64,
             dt: self.manifest.dt_s as f32,
             max_push_mm: self.manifest.envelope.max_push_mm,
-            provider: self.choice.provider,
+            provider: self.execution.choice.provider,
             precision: match &self.kind {
                 KindModel::Upt(upt) => upt.precision,
                 KindModel::Reduced(reduced) => reduced.precision(),
@@ -301,6 +306,7 @@ impl Model {
     /// JSON: name, bundle hash, provider of each stage and why others were not taken, ONNX Runtime's file and version.
     pub fn describe_json(&self) -> String {
         let refused: Vec<serde_json::Value> = self
+            .execution
             .choice
             .refused
             .iter()
@@ -309,14 +315,14 @@ impl Model {
             )
             .collect();
         let native = "native";
-        let latent = self.choice.provider.name();
+        let latent = self.execution.choice.provider.name();
         let stages = match &self.kind {
             KindModel::Upt(kind) => serde_json::json!({
                 "encode": native, "aggregate": native, "latent": latent,
                 "decode": "native, or onnxruntime where the scene asks for it",
                 "step_graph": kind.has_step(),
             }),
-            KindModel::Reduced(_) if self.runtime.is_none() => {
+            KindModel::Reduced(_) if self.execution.runtime.is_none() => {
                 serde_json::json!({"prior": native, "decode": native})
             }
             KindModel::Reduced(_) => {
@@ -332,13 +338,13 @@ impl Model {
             "supports": NodeSet::listed(&self.mesh.supports),
             "regions": NodeSet::listed(&self.mesh.regions),
             "gravity_at_rest_m_s2": self.manifest.gravity_at_rest_m_s2,
-            "threads": self.threads,
+            "threads": self.execution.threads,
             "stages": stages,
             "providers_refused": refused,
-            "latent_nodes": self.choice.nodes,
-            "latent_memory": self.choice.memory,
-            "instruction_set": format!("{:?}", self.isa),
-            "onnxruntime": self.runtime.map(|runtime| {
+            "latent_nodes": self.execution.choice.nodes,
+            "latent_memory": self.execution.choice.memory,
+            "instruction_set": format!("{:?}", self.execution.isa),
+            "onnxruntime": self.execution.runtime.map(|runtime| {
                 serde_json::json!({"path": runtime.path().display().to_string(), "version": runtime.version()})
             }),
         })
@@ -350,7 +356,7 @@ impl Model {
     /// # Errors
     /// [`crate::Error::Unsupported`] for a bundle without graphs.
     pub(crate) fn runtime(&self) -> Result<&'static Runtime> {
-        self.runtime.ok_or_else(|| {
+        self.execution.runtime.ok_or_else(|| {
             crate::error::Error::Unsupported(format!("{} has no graph", self.manifest.name))
         })
     }

@@ -27,7 +27,7 @@ pub(super) fn build(
     envelope: Option<EnvelopeCheck>,
 ) -> Result<Core> {
     let threads = match options.threads {
-        0 => model.threads,
+        0 => model.execution.threads,
         threads => threads,
     };
     if threads > 1024 {
@@ -35,7 +35,7 @@ pub(super) fn build(
             "threads is {threads}, must be at most 1024"
         )));
     }
-    let isa = model.isa;
+    let isa = model.execution.isa;
     let _mode = FlushToZero::of_portable(isa);
     let pool = Pool::of(isa, threads)?;
     let own_mesh = match &options.mesh_path {

@@ -72,7 +72,7 @@ impl Scene {
         if view != View::Surface {
             lock_read(&self.shared.published).check_len(view, out.len())?;
         }
-        let _mode = FlushToZero::of(self.model.isa);
+        let _mode = FlushToZero::of(self.model.execution.isa);
         let mut presenters = lock(&self.tools.presenters)?;
         let attached = match view {
             View::Region => None,

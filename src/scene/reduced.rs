@@ -61,7 +61,7 @@ struct LearnedStage {
 
 impl LearnedStage {
     fn new(model: &Model, map: &LearnedMap) -> Result<LearnedStage> {
-        let mut stage = map.stage(&model.plan)?;
+        let mut stage = map.stage(&model.execution.plan)?;
         stage.warm_up()?;
         let modes = map.entry.modes;
         Ok(LearnedStage {

@@ -266,7 +266,7 @@ fn made<'a>(
                 ContactProblem::new(
                     body.model.samples()?,
                     Arc::clone(&body.mesh),
-                    body.model.isa,
+                    body.model.execution.isa,
                 )
             };
             Ok(none.insert(Proven::new(make, WHAT)?))

@@ -38,7 +38,6 @@ RECORDS = {
 LARGER: dict[str, tuple[int, int]] = {
     "bundle::Mesh": (15, 12),
     "upt::Between": (18, 5),
-    "upt::Model": (18, 20),
     "upt::Scene": (7, 64),
 }
 

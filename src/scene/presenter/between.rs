@@ -95,7 +95,11 @@ impl Between {
             held[node as usize] = true;
         }
         let natural = corrections.space.natural_count();
-        let problem = ContactProblem::new(model.samples()?, Arc::clone(&model.mesh), model.isa)?;
+        let problem = ContactProblem::new(
+            model.samples()?,
+            Arc::clone(&model.mesh),
+            model.execution.isa,
+        )?;
         Ok(Between {
             touched: TouchedTissue::new(prior, problem.surface.samples.all_nodes(), count)?,
             shown: None,
@@ -105,8 +109,9 @@ impl Between {
                 velocity: field()?,
                 ..KnownStep::default()
             },
-            pool: Pool::of(model.isa, 1).map_err(|error| Error::Argument(error.to_string()))?,
-            isa: model.isa,
+            pool: Pool::of(model.execution.isa, 1)
+                .map_err(|error| Error::Argument(error.to_string()))?,
+            isa: model.execution.isa,
             held,
             last: field()?,
             velocity: field()?,

@@ -36,14 +36,14 @@ impl Decoders {
                 (0..threads)
                     .map(|_| {
                         Ok(Mutex::new(
-                            kind.decoder_stage(model.runtime()?, &model.plan)?,
+                            kind.decoder_stage(model.runtime()?, &model.execution.plan)?,
                         ))
                     })
                     .collect::<Result<_>>()?,
             ),
             DecoderKernel::Resident => Decoders::Resident(Box::new(kind.resident_decoder(
                 model.runtime()?,
-                &model.plan,
+                &model.execution.plan,
                 threads,
                 &tables.query_table,
             )?)),

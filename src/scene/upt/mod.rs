@@ -116,7 +116,7 @@ impl UptEngine {
                 vibration: zeros(vibration.map_or(0, |vibration| vibration.state_len()))?,
             })
         };
-        let (runtime, plan, threads) = (model.runtime()?, &model.plan, pool.threads());
+        let (runtime, plan, threads) = (model.runtime()?, &model.execution.plan, pool.threads());
         let path = if choice.whole {
             let stage = kind.step_stage(runtime, plan, threads, tables)?;
             Path::Whole(memory::boxed(stage, STATES)?)

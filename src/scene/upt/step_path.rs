@@ -44,7 +44,7 @@ impl Parts<'_> {
             DecoderKernel::Auto => DecoderKernel::Resident,
             kernel => kernel,
         };
-        let precision = options.precision.unwrap_or(self.model.precision);
+        let precision = options.precision.unwrap_or(self.model.execution.precision);
         let make = |whole| {
             let choice = Choice {
                 whole,
@@ -118,7 +118,7 @@ impl Parts<'_> {
     /// Milliseconds of the network and of decoding every node, at rest.
     fn time(&self, engine: &mut UptEngine, field: &mut [f32]) -> Result<f64> {
         let compute = Compute {
-            isa: self.model.isa,
+            isa: self.model.execution.isa,
             pool: self.pool,
         };
         let nodes = memory::collected(self.node_count, 0..self.node_count as u32, "a timed step")?;
