@@ -37,7 +37,6 @@ RECORDS = {
 # Crate and type: fields and methods at most.
 LARGER: dict[str, tuple[int, int]] = {
     "bundle::Mesh": (15, 12),
-    "upt::Between": (18, 5),
     "upt::Scene": (7, 64),
 }
 

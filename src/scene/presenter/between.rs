@@ -6,19 +6,18 @@
 use std::mem::swap;
 use std::sync::Arc;
 
-use super::contact_response::ContactResponse;
+use super::contact_response::{ContactResponse, FrameModes};
 use super::extrapolation::VelocityExtrapolation;
-use super::known_step::KnownStep;
+use super::known_step::{KnownStep, StepState};
 use super::led::LedGroups;
-use super::nodes::{Nodes, ResponseContext};
+use super::nodes::{DrivenNodes, ResponseContext};
 use super::solves::{Drive, Moves, SolveKey, Solves};
-use super::touched::TouchedTissue;
+use super::touched::{ShownTissue, TouchedTissue};
 use crate::contact::problem::Change;
 use crate::contact::{Compliance, ContactProblem, State};
 use crate::error::{Error, Result};
-use crate::field::ContactSet;
 use crate::kernels::rows::{RowPlan, decode_rows};
-use crate::kernels::{Isa, Pool};
+use crate::kernels::{Machine, Pool};
 use crate::memory::{self, HeldBytes};
 use crate::scene::frame_state::FrameState;
 use crate::scene::step_input::{Contact, FrameInput};
@@ -47,37 +46,22 @@ pub(super) struct ShownNodes<'a> {
 pub(super) struct Between {
     /// Contact at the poses of the frame. Its past is that of the known step, never of a frame: frames leave no trace.
     problem: ContactProblem,
+    pub known: StepState,
     /// The step before the known one, or what the next is read into.
     other: KnownStep,
     /// Of one thread: the scene's own pool may be at work on a step.
     #[held(skip)]
-    pool: Pool,
-    #[held(skip)]
-    isa: Isa,
+    machine: Machine,
     /// By node: whether the mesh holds it.
     held: Vec<bool>,
-    /// State of the step, its velocity, and its tissue at the moment asked for, `[K,3]`.
-    last: Vec<f32>,
-    velocity: Vec<f32>,
-    pub free: Vec<f32>,
-    /// Where the tissue would be at the samples' nodes, once contact has moved it.
-    touched: TouchedTissue,
-    /// Which of the solves was shown last.
-    shown: Option<usize>,
-    /// Which step that is.
-    pub step: Option<u64>,
-    /// Amplitudes of the natural modes, what inertia takes off their compliance at the time of the frame, and the list `0..n` of their rows.
-    natural: Vec<f32>,
-    inertial_compliance: Vec<f32>,
-    rows: Vec<u32>,
+    pub shown: ShownTissue,
+    modes: FrameModes,
     /// How much of the last velocities goes on at each place.
     extrapolation: VelocityExtrapolation,
     /// Contact at nodes in place of tools.
-    nodes: Box<Nodes>,
+    nodes: DrivenNodes,
     /// Support groups where the frame's input has them.
     led: LedGroups,
-    /// Where the host has nodes in this frame.
-    now: ContactSet,
 }
 
 impl Between {
@@ -94,36 +78,38 @@ impl Between {
         for &node in &scene.mesh.held_nodes {
             held[node as usize] = true;
         }
-        let natural = corrections.space.natural_count();
         let problem = ContactProblem::new(
             model.samples()?,
             Arc::clone(&model.mesh),
             model.execution.isa,
         )?;
         Ok(Between {
-            touched: TouchedTissue::new(prior, problem.surface.samples.all_nodes(), count)?,
-            shown: None,
+            shown: ShownTissue {
+                free: field()?,
+                touched: TouchedTissue::new(prior, problem.surface.samples.all_nodes(), count)?,
+                solve: None,
+            },
             problem,
+            known: StepState {
+                step: None,
+                last: field()?,
+                velocity: field()?,
+            },
             other: KnownStep {
                 last: field()?,
                 velocity: field()?,
                 ..KnownStep::default()
             },
-            pool: Pool::of(model.execution.isa, 1)
-                .map_err(|error| Error::Argument(error.to_string()))?,
-            isa: model.execution.isa,
+            machine: Machine {
+                isa: model.execution.isa,
+                pool: Pool::of(model.execution.isa, 1)
+                    .map_err(|error| Error::Argument(error.to_string()))?,
+            },
             held,
-            last: field()?,
-            velocity: field()?,
-            free: field()?,
-            step: None,
-            natural: memory::zeros(natural, WHAT)?,
-            inertial_compliance: memory::zeros(natural, WHAT)?,
-            rows: memory::collected(natural, 0..natural as u32, WHAT)?,
+            modes: FrameModes::new(corrections.space.natural_count())?,
             extrapolation: VelocityExtrapolation::new()?,
-            nodes: memory::boxed(Nodes::default(), WHAT)?,
+            nodes: DrivenNodes::new()?,
             led: LedGroups::default(),
-            now: ContactSet::default(),
         })
     }
 
@@ -167,12 +153,12 @@ impl Between {
             groups,
             paths,
         } = &mut self.other;
-        swap(&mut self.step, step);
-        swap(&mut self.last, last);
-        swap(&mut self.velocity, velocity);
+        swap(&mut self.known.step, step);
+        swap(&mut self.known.last, last);
+        swap(&mut self.known.velocity, velocity);
         swap(&mut self.problem.past, past);
-        swap(&mut self.nodes.then, then);
-        swap(&mut self.nodes.forces, forces);
+        swap(&mut self.nodes.of_step.then, then);
+        swap(&mut self.nodes.of_step.forces, forces);
         swap(&mut self.led.states, groups);
         swap(&mut self.extrapolation.paths, paths);
     }
@@ -191,7 +177,7 @@ impl Between {
     ) -> Result<()> {
         let model = scene.model;
         let (Some(prior), corrections, Some(step)) =
-            (&model.prior, model.corrections()?, self.step)
+            (&model.prior, model.corrections()?, self.known.step)
         else {
             return Ok(());
         };
@@ -202,18 +188,21 @@ impl Between {
         // Without a drive the tools of the last step have left, or its nodes are released.
         let FrameInput { contact, supports } = driven;
         let driven = match contact {
-            Contact::None if self.nodes.then.is_empty() => Contact::Tools(&[]),
+            Contact::None if self.nodes.of_step.then.is_empty() => Contact::Tools(&[]),
             other => other,
         };
-        let (last, velocity) = (self.last.as_slice(), self.velocity.as_slice());
+        let (last, velocity) = (self.known.last.as_slice(), self.known.velocity.as_slice());
         match driven {
             Contact::Tools(tools) => {
                 self.extrapolation
                     .look(&self.problem, tools, (rest, last), (tau, alpha));
             }
             nodes => {
-                nodes.gather(&mut self.now, [scene.intact_nodes, self.held.len()])?;
-                let stretch = self.nodes.stretch(&self.now, last, velocity, tau);
+                nodes.gather(&mut self.nodes.now, [scene.intact_nodes, self.held.len()])?;
+                let stretch = self
+                    .nodes
+                    .of_step
+                    .stretch(&self.nodes.now, last, velocity, tau);
                 self.extrapolation.follow_evenly(stretch, (tau, alpha));
             }
         }
@@ -223,7 +212,7 @@ impl Between {
             supports,
             &self.extrapolation,
             fields,
-            &mut self.free,
+            &mut self.shown.free,
         )?;
         let question = SolveKey {
             step,
@@ -232,7 +221,7 @@ impl Between {
             led: self.led.key(),
             drive: match driven {
                 Contact::Tools(tools) => Drive::Tools(tools),
-                _ => Drive::Nodes(&self.now),
+                _ => Drive::Nodes(&self.nodes.now),
             },
         };
         // Two views of one moment ask the same: the contact is solved once for them.
@@ -246,42 +235,43 @@ impl Between {
         for nodes in [touched, view.region] {
             let moved = |node, u| self.led.moved(groups, node, u);
             self.extrapolation
-                .follow(nodes, fields, moved, &mut self.free);
+                .follow(nodes, fields, moved, &mut self.shown.free);
         }
         let make = |q: &mut [f32]| -> Result<Moves> {
             let kappa = scene.integrator.over(tau.max(AT_ONCE_S)).kappa();
             // As many as before.
-            self.inertial_compliance.clear();
-            self.inertial_compliance
+            self.modes.inertial_compliance.clear();
+            self.modes
+                .inertial_compliance
                 .extend(corrections.space.holds_back(kappa));
             let response = ContactResponse {
-                isa: self.isa,
-                pool: &self.pool,
+                isa: self.machine.isa,
+                pool: &self.machine.pool,
                 prior,
                 space: &corrections.space,
-                inertial_compliance: &self.inertial_compliance,
-                rows: &self.rows,
+                inertial_compliance: &self.modes.inertial_compliance,
+                rows: &self.modes.rows,
             };
             let tools = match question.drive {
                 Drive::Tools(tools) => tools,
                 Drive::Nodes(now) => {
-                    let near = !now.is_empty() || !self.nodes.then.is_empty();
+                    let near = !now.is_empty() || !self.nodes.of_step.then.is_empty();
                     if tau <= AT_ONCE_S || !near {
                         return Ok(Moves::Nothing);
                     }
                     let means = ResponseContext {
-                        isa: self.isa,
+                        isa: self.machine.isa,
                         prior,
                         space: &corrections.space,
-                        inertial_compliance: &self.inertial_compliance,
+                        inertial_compliance: &self.modes.inertial_compliance,
                         held: &self.held,
                     };
-                    self.nodes.solve(&means, now, &self.free)?;
+                    self.nodes.of_step.solve(&means, now, &self.shown.free)?;
                     let change = Change {
-                        dofs: &self.nodes.dofs,
-                        forces: &self.nodes.change,
+                        dofs: &self.nodes.of_step.dofs,
+                        forces: &self.nodes.of_step.change,
                     };
-                    response.add(change, &mut self.natural, false, q)?;
+                    response.add(change, &mut self.modes.natural, false, q)?;
                     return Ok(Moves::Pushed);
                 }
             };
@@ -289,14 +279,14 @@ impl Between {
             for pushed in [Moves::Pushed, Moves::Stays] {
                 if pushed == Moves::Stays {
                     let nodes = self.problem.surface.samples.all_nodes();
-                    self.led.stay(groups, nodes, last, &mut self.free);
+                    self.led.stay(groups, nodes, last, &mut self.shown.free);
                     q.fill(0.0);
                 }
                 self.problem.begin_frame(tools, rest, last)?;
                 self.problem.tied.step_s = tau as f32;
                 let state = State {
                     rest,
-                    u: &self.free,
+                    u: &self.shown.free,
                     start: last,
                 };
                 if tau <= AT_ONCE_S || !self.problem.is_near(state)? {
@@ -308,20 +298,22 @@ impl Between {
                 let compliance = Compliance::at_rest(
                     prior,
                     &self.held,
-                    Some((&corrections.space, &self.inertial_compliance)),
+                    Some((&corrections.space, &self.modes.inertial_compliance)),
                 );
                 let change = self.problem.solve_between(compliance, state)?;
-                response.add(change, &mut self.natural, false, q)?;
+                response.add(change, &mut self.modes.natural, false, q)?;
                 // As in a step: a quick or thin tool that has lost the contact is pressed again about where the tissue has come to.
                 for press in 0..=MORE_PRESSES {
                     if !self.problem.ways.may_lose() || self.problem.work.is_spent() {
                         return Ok(pushed);
                     }
-                    let means = (self.isa, &self.pool, &**prior);
+                    let means = (self.machine.isa, &self.machine.pool, &**prior);
                     let nodes = (self.problem.surface.samples.all_nodes(), &*self.held);
-                    self.touched.place(means, nodes, &self.free, Some(q))?;
-                    if !(self.touched).has_lost(&mut self.problem, rest, last) {
-                        if !self.touched.has_flung(&self.problem) {
+                    self.shown
+                        .touched
+                        .place(means, nodes, &self.shown.free, Some(q))?;
+                    if !(self.shown.touched).has_lost(&mut self.problem, rest, last) {
+                        if !self.shown.touched.has_flung(&self.problem) {
                             return Ok(pushed);
                         }
                         q.fill(0.0);
@@ -330,9 +322,9 @@ impl Between {
                     if press == MORE_PRESSES {
                         break;
                     }
-                    let u = self.touched.displacement();
+                    let u = self.shown.touched.displacement();
                     let change = (self.problem).solve_between(compliance, State { u, ..state })?;
-                    response.add(change, &mut self.natural, true, q)?;
+                    response.add(change, &mut self.modes.natural, true, q)?;
                 }
             }
             Ok(Moves::Stays)
@@ -341,17 +333,17 @@ impl Between {
             Some(place) => place,
             None => solves.make(&question, prior.width(), make)?,
         };
-        self.shown = Some(place);
+        self.shown.solve = Some(place);
         if solves.stays(place) {
             let nodes = self.problem.surface.samples.all_nodes().iter();
             let nodes = nodes.chain(view.region);
-            self.led.stay(groups, nodes, last, &mut self.free);
+            self.led.stay(groups, nodes, last, &mut self.shown.free);
         }
         let moves = solves.moves(place);
         if let Some(q) = moves {
             decode_rows(
-                self.isa,
-                &self.pool,
+                self.machine.isa,
+                &self.machine.pool,
                 &prior.basis(),
                 view.plan,
                 q,
@@ -360,7 +352,7 @@ impl Between {
         }
         let nodes = out.as_chunks_mut::<3>().0.iter_mut().zip(view.region);
         for ((out, &node), moved) in nodes.zip(view.moved.as_chunks::<3>().0) {
-            let free = &self.free.as_chunks::<3>().0[node as usize];
+            let free = &self.shown.free.as_chunks::<3>().0[node as usize];
             *out = match (self.held[node as usize], moves) {
                 // It goes on as it went: on, or nowhere.
                 (true, _) => *free,
@@ -388,16 +380,18 @@ impl Between {
         let (Some(prior), Contact::Tools(tools)) = (&scene.model.prior, driven.contact) else {
             return Ok(false);
         };
-        let (rest, last) = (scene.mesh.positions.as_slice(), self.last.as_slice());
+        let (rest, last) = (scene.mesh.positions.as_slice(), self.known.last.as_slice());
         self.problem.begin_frame(tools, rest, last)?;
         if !self.problem.ways.may_lose() {
             return Ok(false);
         }
-        let q = self.shown.and_then(|place| solves.moves(place));
+        let q = self.shown.solve.and_then(|place| solves.moves(place));
         let nodes = (self.problem.surface.samples.all_nodes(), &*self.held);
-        let means = (self.isa, &self.pool, &**prior);
-        self.touched.place(means, nodes, &self.free, q)?;
-        self.touched.replace(region, u);
-        Ok(self.touched.has_lost(&mut self.problem, rest, last))
+        let means = (self.machine.isa, &self.machine.pool, &**prior);
+        self.shown
+            .touched
+            .place(means, nodes, &self.shown.free, q)?;
+        self.shown.touched.replace(region, u);
+        Ok(self.shown.touched.has_lost(&mut self.problem, rest, last))
     }
 }

@@ -4,7 +4,10 @@ use crate::contact::problem::Change;
 use crate::error::Result;
 use crate::kernels::respond::accumulate_rows;
 use crate::kernels::{Isa, Pool};
+use crate::memory::{self, HeldBytes};
 use crate::prior::{CoarseSpace, PriorTable};
+
+const WHAT: &str = "the modes of a frame";
 
 /// What the forces of a contact move, in the coordinates of the linear response.
 pub(super) struct ContactResponse<'a> {
@@ -15,6 +18,31 @@ pub(super) struct ContactResponse<'a> {
     pub inertial_compliance: &'a [f32],
     /// Those of the natural modes.
     pub rows: &'a [u32],
+}
+
+/// The natural modes in a frame.
+#[derive(HeldBytes)]
+pub(super) struct FrameModes {
+    /// Their amplitudes.
+    pub natural: Vec<f32>,
+    /// What inertia takes off their compliance at the time of the frame.
+    pub inertial_compliance: Vec<f32>,
+    /// `0..n`.
+    pub rows: Vec<u32>,
+}
+
+impl FrameModes {
+    /// Of `count` modes.
+    ///
+    /// # Errors
+    /// [`crate::Error::OutOfMemory`].
+    pub fn new(count: usize) -> Result<FrameModes> {
+        Ok(FrameModes {
+            natural: memory::zeros(count, WHAT)?,
+            inertial_compliance: memory::zeros(count, WHAT)?,
+            rows: memory::collected(count, 0..count as u32, WHAT)?,
+        })
+    }
 }
 
 impl ContactResponse<'_> {

@@ -22,3 +22,12 @@ pub(super) struct KnownStep {
     /// How the tools had moved, from which a frame guesses how the tissue goes on.
     pub(super) paths: ToolPaths,
 }
+
+/// The state of the step that frames start from, `[K,3]`.
+#[derive(HeldBytes)]
+pub(super) struct StepState {
+    /// Which step that is.
+    pub step: Option<u64>,
+    pub last: Vec<f32>,
+    pub velocity: Vec<f32>,
+}

@@ -132,7 +132,7 @@ impl Presenter {
         if attached.is_none() {
             shared.check_len(View::Region, len)?;
         }
-        let count = self.between.free.len() / 3;
+        let count = self.between.shown.free.len() / 3;
         let wanted = shared.region.as_deref();
         let same = match (&attached, wanted) {
             (Some(points), _) => self
@@ -167,7 +167,7 @@ impl Presenter {
         self.plan = plan;
         self.region = region;
         self.attached = attached;
-        self.between.step = None;
+        self.between.known.step = None;
         Ok(())
     }
 
@@ -187,7 +187,7 @@ impl Presenter {
             step_before(&shared, when)?
         };
         let mut nodal = std::mem::take(&mut self.nodal);
-        let made = match self.between.step == Some(step) {
+        let made = match self.between.known.step == Some(step) {
             true => {
                 self.step_blend.look(tau);
                 self.show(scene, tau, driven, solves, &mut nodal)
@@ -211,7 +211,7 @@ impl Presenter {
             match &self.attached {
                 None => out.copy_from(&nodal),
                 Some(attached) => {
-                    let field = &mut self.between.free;
+                    let field = &mut self.between.shown.free;
                     for (u, &node) in nodal.as_chunks::<3>().0.iter().zip(&self.region) {
                         field[3 * node as usize..][..3].copy_from_slice(u);
                     }
@@ -251,7 +251,7 @@ impl Presenter {
         out: &mut [f32],
     ) -> Result<()> {
         let step_s = scene.integrator.step_s;
-        let known = self.between.step;
+        let known = self.between.known.step;
         let mut since_s = 0.0;
         if let Some(known) = known {
             // What the frame would have been without the new step: it goes on from there.

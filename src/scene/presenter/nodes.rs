@@ -20,6 +20,27 @@ pub(super) struct ResponseContext<'a> {
     pub held: &'a [bool],
 }
 
+/// Contact at nodes in a frame.
+#[derive(HeldBytes)]
+pub(super) struct DrivenNodes {
+    pub of_step: Box<Nodes>,
+    /// Where the host has them.
+    pub now: ContactSet,
+}
+
+impl DrivenNodes {
+    /// None.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn new() -> Result<DrivenNodes> {
+        Ok(DrivenNodes {
+            of_step: memory::boxed(Nodes::default(), "contact at nodes")?,
+            now: ContactSet::default(),
+        })
+    }
+}
+
 /// The nodes of the step before a frame, and the change of their forces.
 #[derive(Default, HeldBytes)]
 pub(super) struct Nodes {

@@ -14,6 +14,17 @@ const KEPT_MM: f32 = 0.45;
 /// Contact that takes a node this much farther than a tool has gone has flung it, mm.
 const FLUNG_MM: f32 = 10.0;
 
+/// The tissue of a frame.
+#[derive(HeldBytes)]
+pub(super) struct ShownTissue {
+    /// At the moment asked for, before contact has moved it, `[K,3]`.
+    pub free: Vec<f32>,
+    /// Where it would be at the samples' nodes, once contact has.
+    pub touched: TouchedTissue,
+    /// Which of the solves was shown last.
+    pub solve: Option<usize>,
+}
+
 /// The surface that tools may touch.
 #[derive(HeldBytes)]
 pub(super) struct TouchedTissue {
