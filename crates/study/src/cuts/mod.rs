@@ -57,6 +57,8 @@ struct Row {
     refused: usize,
     /// How far a node is from rest at the most, mm: by the library, and by the solver.
     farthest_mm: [f64; 2],
+    /// What a node goes at the most in a frame that changes the body, mm, the same.
+    jump_mm: [f64; 2],
     /// ms: a change of the body, median and largest; a step, median and 99 %.
     change_ms: [f64; 2],
     step_ms: [f64; 2],
@@ -77,6 +79,7 @@ struct Found {
     changes: Vec<f64>,
     steps: Steps,
     farthest_mm: [f64; 2],
+    jump_mm: [f64; 2],
 }
 
 /// Measures and prints the table.
@@ -94,7 +97,10 @@ pub fn report(asked: &Options) -> Result<ExitCode> {
             for effort in &subject.efforts {
                 let is_asked = |programme: &&Programme| {
                     let names = &asked.programme;
-                    names.is_empty() || names.iter().any(|name| name == programme.name)
+                    match names.is_empty() {
+                        true => !programme.is_long,
+                        false => names.iter().any(|name| name == programme.name),
+                    }
                 };
                 for programme in PROGRAMMES.iter().filter(is_asked) {
                     let mut found = Found {
@@ -159,6 +165,8 @@ fn case(
         .collect();
     let mut twin = Solver::new(mesh, boundary, subject.solver())?;
     twin.set_tools(mesh.samples(boundary), &[rigid], &[ball.pose])?;
+    // Where the mesh's nodes were in the frame before: by the library, and by the solver.
+    let mut before = [(); 2].map(|()| vec![[0.0; 3]; mesh.node_count()]);
     for frame in frames {
         for operation in &frame.operations {
             operate((subject, scene), (&mut truth, &mut twin), operation, found)?;
@@ -191,6 +199,14 @@ fn case(
         for (most, own) in found.farthest_mm.iter_mut().zip(farthest) {
             *most = most.max(own);
         }
+        for ((most, before), now) in found.jump_mm.iter_mut().zip(&mut before).zip([u, &wanted]) {
+            let now = &now[..before.len()];
+            let went = before.iter().zip(now).map(|(a, b)| square(*a, *b).sqrt());
+            if !frame.operations.is_empty() {
+                *most = most.max(largest(went));
+            }
+            before.copy_from_slice(now);
+        }
         // The mesh's own nodes: copies are made where a corner lies in either.
         let at = |node: usize| square(u[node], wanted[node]);
         let all = (0..mesh.node_count()).map(at).sum::<f64>() / mesh.node_count() as f64;
@@ -201,6 +217,10 @@ fn case(
         let own = scene.with_contact_report(|report| report.readings[0].force);
         found.force.add(own, Vector::from(told.tools[0].force));
     }
+    let [own, told] = found.jump_mm;
+    eprintln!(
+        "changes of the body move a node by {own:.3} mm a frame at the most, by {told:.3} in the solver"
+    );
     let copies = scene.node_count() - mesh.node_count();
     found.copies.push(copies as f64);
     Ok(())
@@ -301,6 +321,7 @@ impl Found {
             fell_back: self.steps.fell_back,
             refused: self.steps.refused,
             farthest_mm: self.farthest_mm,
+            jump_mm: self.jump_mm,
             change_ms: [
                 median(self.changes.iter().copied()),
                 largest(self.changes.iter().copied()),

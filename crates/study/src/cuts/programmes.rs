@@ -50,62 +50,80 @@ pub struct Programme {
     pub elsewhere: Option<fn(&Site) -> Vec<Frame>>,
     /// Whether blades feel the tissue. What pushes a piece that they have cut free throws it away, by metres in the reference solver.
     pub feels: bool,
+    /// It takes minutes, and is measured where it is asked for by name.
+    pub is_long: bool,
 }
 
-pub const PROGRAMMES: [Programme; 9] = [
+pub const PROGRAMMES: [Programme; 10] = [
     Programme {
         name: "incise",
         frames: incise,
         elsewhere: None,
         feels: true,
+        is_long: false,
     },
     Programme {
         name: "again",
         frames: again,
         elsewhere: Some(|site| slit(site, 1)),
         feels: true,
+        is_long: false,
     },
     Programme {
         name: "flap",
         frames: flap,
         elsewhere: None,
         feels: true,
+        is_long: false,
     },
     Programme {
         name: "resect",
         frames: resect,
         elsewhere: None,
         feels: true,
+        is_long: false,
     },
     Programme {
         name: "biopsy",
         frames: biopsy,
         elsewhere: None,
         feels: false,
+        is_long: false,
     },
     Programme {
         name: "divide",
         frames: divide,
         elsewhere: None,
         feels: false,
+        is_long: false,
     },
     Programme {
         name: "wall",
         frames: wall,
         elsewhere: None,
         feels: false,
+        is_long: false,
     },
     Programme {
         name: "part",
         frames: part,
         elsewhere: None,
         feels: true,
+        is_long: false,
     },
     Programme {
         name: "coagulate",
         frames: coagulate,
         elsewhere: None,
         feels: true,
+        is_long: false,
+    },
+    Programme {
+        name: "aspirate",
+        frames: aspirate,
+        elsewhere: None,
+        feels: false,
+        is_long: true,
     },
 ];
 
@@ -242,6 +260,32 @@ fn resect(site: &Site) -> Vec<Frame> {
     come(&mut frames, site, over);
     go(&mut frames, false, 8, over, deep);
     go(&mut frames, false, 8, deep, deep);
+    frames
+}
+
+/// A ball presses 3 mm deep, 12 mm aside, while an aspirator of 6 mm takes 5 cm³ in a minute, to and fro over 20 mm and ever deeper: no node may leap.
+fn aspirate(site: &Site) -> Vec<Frame> {
+    const FRAMES: usize = 1200;
+    let (over, deep) = (
+        site.place(0.0, 12.0, 5.0),
+        site.place(0.0, 12.0, BALL_MM - 3.0),
+    );
+    let mut frames = Vec::new();
+    come(&mut frames, site, over);
+    go(&mut frames, false, 8, over, deep);
+    frames.extend((0..FRAMES).map(|at| {
+        let part = at as f32 / FRAMES as f32;
+        let ahead = 10.0 * (std::f32::consts::TAU * 6.0 * part).sin();
+        Frame {
+            operations: vec![Operation::Aspirate {
+                at: site.place(ahead, 0.0, 3.0 - 12.0 * part),
+                radius: 6.0,
+                most_mm3: 5000.0 / FRAMES as f32,
+            }],
+            ball: Some(deep),
+            grasp: false,
+        }
+    }));
     frames
 }
 
