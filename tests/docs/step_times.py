@@ -8,7 +8,7 @@ from pathlib import Path
 
 # A cell of a table of results: data, number of the table, what stands in its row, column.
 Cell = tuple[str, int, tuple[str, ...], str] | None
-TOOLS = "[all programmes](accuracy.md#tools)"
+TOOLS = "[all programmes](data/tools-times.json)"
 RIVALS = "[rivals](accuracy.md#rivals)"
 WEB = "[the web](#webassembly)"
 VIEW = "[the browser](#upt-view)"
@@ -17,9 +17,9 @@ SETTINGS = ("k = 0", "k = 3", "as recommended")
 NATIVE, MODULE = "native, ms: median, 99 %", "WebAssembly, ms"
 
 
-def tools(name: str) -> list[Cell]:
+def tools(number: int) -> list[Cell]:
     """All programmes of tools."""
-    return [(f"tools-{name}", 3, ("contact solved", k), "ms a step") for k in EFFORTS]
+    return [("tools-times", number, ("contact solved", k), "ms a step") for k in EFFORTS]
 
 
 def rivals(number: int) -> list[Cell]:
@@ -33,8 +33,8 @@ def three(bundle: str, column: str) -> list[Cell]:
 
 
 ROWS: tuple[tuple[str, str, str, list[Cell], str], ...] = (
-    ("AMD EPYC, 2 threads", "coarse brain", "3,152", tools("brain-coarse"), TOOLS),
-    ("AMD EPYC, 2 threads", "brain", "21,708", tools("brain"), TOOLS),
+    ("Xeon, 1 thread", "coarse brain", "3,152", tools(1), TOOLS),
+    ("Xeon, 1 thread", "brain", "21,708", tools(2), TOOLS),
     ("AMD EPYC, 1 thread", "coarse brain, one press", "3,152", rivals(1), RIVALS),
     ("AMD EPYC, 1 thread", "brain, one press", "21,708", rivals(5), RIVALS),
     ("AMD EPYC, 1 thread, steps of 20 ms", "liver", "1,178", three("liver-coarse", NATIVE), WEB),
@@ -42,7 +42,7 @@ ROWS: tuple[tuple[str, str, str, list[Cell], str], ...] = (
     ("the same in WebAssembly", "liver", "1,178", three("liver-coarse", MODULE), WEB),
     ("the same in WebAssembly", "brain (`brain-supported`)", "21,708", three("supported", MODULE), WEB),
     (
-        "AMD EPYC, 2 cores that also draw the page",
+        "Xeon, 2 cores that also draw the page",
         "brain, steps of 20 ms",
         "21,708",
         [None, None, ("view", 1, ("step meanwhile, ms",), "median")],
