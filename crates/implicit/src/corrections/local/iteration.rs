@@ -126,7 +126,7 @@ impl LocalSolver {
                 add(1.0, &force, &mut field[place..]);
             }
         });
-        near.project(env, field, &mut self.spare.room.q);
+        near.blocks.project(env, field, &mut self.spare.room.q);
         let work = &mut self.spare.on_modes;
         env.on_modes_in(&near.blocks.ranges, &self.spare.room.q, work);
         add(-1.0, work, p);
@@ -153,8 +153,7 @@ impl LocalSolver {
         is_known.then_some(p)
     }
 
-    /// `P` of the reduced residual, added to the direction ([`super::factor`]); outside of the core `w D^-1`. Leaves what it moves the modes by at the near nodes,
-    /// by place, in `room.linear`.
+    /// `P` of the reduced residual, added to the direction ([`super::factor`]); outside of the core `w D^-1`.
     fn precondition(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
         let preconditioner = &*step.preconditioner;
@@ -181,9 +180,10 @@ impl LocalSolver {
         preconditioner.respond_on_modes(env, p, &mut self.spare.solved)?;
         add(1.0, &self.spare.solved, &mut self.d.step.c);
         add(1.0, t, &mut self.d.step.t);
-        env.near_coordinates(&self.spare.solved, &near.blocks.ranges, &mut room.q);
-        resize(&mut room.linear, 3 * near.places.nodes.len())?;
-        near.decode(env, &room.q, &mut room.linear)?;
+        // What the modes do in the core and around it is all that the core asks for.
+        env.near_coordinates(&self.spare.solved, &near.around.ranges, &mut room.q);
+        resize(&mut room.linear, 3 * near.places.free)?;
+        near.around.decode(env, &room.q, &mut room.linear)?;
         // In the core the field that the move of the modes stretches over it takes its place.
         self.set.factor.stretch(&room.linear, t);
         self.set.factor.solve(env.isa, t);
@@ -259,9 +259,7 @@ impl LocalSolver {
         }
         env.work_of_modes(&self.spare.loads, &mut reduced.p);
         self.precondition(step)?;
-        // The modes' part of it is decoded already.
-        add(1.0, &self.spare.room.linear, &mut self.d.modes);
-        Ok(())
+        self.decode_direction(step)
     }
 
     /// `Phi c` of the direction at the near nodes.

@@ -162,7 +162,7 @@ impl LocalSolver {
         // From here on `trial` is the base wherever no near node is: only near places are written in an iteration.
         self.residuals.trial.copy_from_slice(base.u);
         self.measured.far_det = f32::MAX;
-        self.evaluate(step, 0.0)?;
+        self.evaluate_near(step)?;
         std::mem::swap(&mut self.residuals.residual, &mut self.residuals.next);
         // What the base has is not what has come since.
         self.residuals.base.copy_from_slice(&self.residuals.inner);
@@ -308,10 +308,9 @@ impl LocalSolver {
         }
     }
 
-    /// The residual of the state at part `t` of the direction, where [`LocalSolver::place_at`] has put it, into `next`; gives the smallest det F.
-    fn evaluate(&mut self, step: &mut StepContext<'_>, t: f32) -> Result<f32> {
+    /// `r_S` of the state of `trial` into `next`, with the forces at the free nodes in `inner`; gives the smallest det F of the near elements.
+    fn evaluate_near(&mut self, step: &StepContext<'_>) -> Result<f32> {
         let env = step.context.env();
-        let far = &step.context.corrections.far;
         self.measured.work += self.set.near.try_work();
         self.residuals.next.clear(&self.set.near)?;
         let (near, inner) = (&mut self.set.near, &mut self.residuals.inner);
@@ -330,6 +329,15 @@ impl LocalSolver {
             .next
             .r
             .copy_from_slice(&inner[..3 * near.places.inside]);
+        Ok(det)
+    }
+
+    /// The residual of the state at part `t` of the direction, where [`LocalSolver::place_at`] has put it, into `next`; gives the smallest det F.
+    fn evaluate(&mut self, step: &mut StepContext<'_>, t: f32) -> Result<f32> {
+        let env = step.context.env();
+        let far = &step.context.corrections.far;
+        let det = self.evaluate_near(step)?;
+        let (near, inner) = (&self.set.near, &self.residuals.inner);
         // What the near elements have added to what is linear.
         resize(&mut self.spare.room.field, 3 * near.places.free)?;
         for (at, added) in self.spare.room.field.iter_mut().enumerate() {
@@ -342,7 +350,7 @@ impl LocalSolver {
             &mut self.spare.room.q,
             &mut self.residuals.next.p,
         );
-        near.project(env, &self.spare.room.field, q);
+        near.blocks.project(env, &self.spare.room.field, q);
         env.on_modes_in(&near.blocks.ranges, q, &mut self.spare.on_modes);
         self.spare.more_on_modes.copy_from_slice(&self.now.step.c);
         add(t, &self.d.step.c, &mut self.spare.more_on_modes);

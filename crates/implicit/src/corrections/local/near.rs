@@ -50,6 +50,8 @@ pub(in crate::corrections) struct NearSet {
     /// What of the far field's clusters is near.
     pub(super) parts: Parts,
     pub blocks: Blocks,
+    /// Those of the core and of the nodes that share an element with it alone.
+    pub around: Blocks,
     /// How many of the parts that follow from the centres have been made for it.
     pub(super) made: u32,
 }
@@ -72,7 +74,7 @@ struct Chosen {
     is_near: Vec<bool>,
 }
 
-/// The blocks of the basis that near nodes are of.
+/// The blocks of the basis that near nodes, or some of them, are of.
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct Blocks {
     plan: RowPlan,
@@ -81,10 +83,23 @@ pub(in crate::corrections) struct Blocks {
 }
 
 impl Blocks {
-    /// Takes those of the free nodes that have places.
-    fn refill(&mut self, env: Env<'_>, places: &Places) -> Result<()> {
+    /// None, of an empty set.
+    fn new(env: Env<'_>) -> Result<Blocks> {
+        Ok(Blocks {
+            plan: RowPlan::try_region(&env.prior.basis(), &[], true)?,
+            ranges: Vec::new(),
+        })
+    }
+
+    /// Takes those of the free nodes with places that are wanted.
+    fn refill(
+        &mut self,
+        env: Env<'_>,
+        places: &Places,
+        is_wanted: impl Fn(u32) -> bool,
+    ) -> Result<()> {
         let basis = env.prior.basis();
-        let row_of = |node: u32| places.free_of(node);
+        let row_of = |node: u32| places.free_of(node).filter(|_| is_wanted(node));
         self.plan.refill(&basis, places.free, row_of)?;
         self.ranges.clear();
         memory::fit(&mut self.ranges, basis.rank_offsets.len(), WHAT)?;
@@ -93,6 +108,22 @@ impl Blocks {
             self.ranges.push(ends[0] as usize..ends[1] as usize);
         }
         Ok(())
+    }
+
+    /// The field of coordinates `[Q]` at these nodes, into those rows of `out [3 free]`.
+    pub fn decode(&self, env: Env<'_>, q: &[f32], out: &mut [f32]) -> Result<()> {
+        let basis = env.prior.basis();
+        Ok(decode_rows(
+            env.isa, env.pool, &basis, &self.plan, q, out,
+        )?)
+    }
+
+    /// `q = U^T r` in these blocks of a field `[3 free]` that is zero at other nodes.
+    pub fn project(&self, env: Env<'_>, r: &[f32], q: &mut [f32]) {
+        for range in &self.ranges {
+            q[range.clone()].fill(0.0);
+        }
+        project_rows(env.isa, &env.prior.basis(), &self.plan, r, q);
     }
 }
 
@@ -116,10 +147,8 @@ impl NearSet {
             },
             elements: LinearElements::default(),
             parts: Parts::default(),
-            blocks: Blocks {
-                plan: RowPlan::try_region(&env.prior.basis(), &[], true)?,
-                ranges: Vec::new(),
-            },
+            blocks: Blocks::new(env)?,
+            around: Blocks::new(env)?,
             made: 0,
         })
     }
@@ -159,7 +188,24 @@ impl NearSet {
         });
         self.elements.take_places(self.places.by_node());
         self.parts.fill(&self.elements, far, self.places.free)?;
-        self.blocks.refill(env, &self.places)
+        self.blocks.refill(env, &self.places, |_| true)?;
+        self.mark_around();
+        let is_around = &self.marks.is_reached;
+        (self.around).refill(env, &self.places, |node| is_around[node as usize])
+    }
+
+    /// Marks the nodes of the core and those that share an element with it as reached, and no others that are near.
+    fn mark_around(&mut self) {
+        let is_reached = &mut self.marks.is_reached;
+        for &node in &self.places.nodes {
+            is_reached[node as usize] = false;
+        }
+        let is_core = |place: &u32| (*place as usize) < self.places.core;
+        for places in self.elements.places().filter(|p| p.iter().any(is_core)) {
+            for place in places {
+                is_reached[self.places.nodes[place as usize] as usize] = true;
+            }
+        }
     }
 
     /// Marks the nodes of the core as reached, and no others that are near.
@@ -294,23 +340,7 @@ impl NearSet {
     pub fn decode(&self, env: Env<'_>, q: &[f32], out: &mut [f32]) -> Result<()> {
         let (free, held) = out.split_at_mut(3 * self.places.free);
         held.fill(0.0);
-        let basis = env.prior.basis();
-        Ok(decode_rows(
-            env.isa,
-            env.pool,
-            &basis,
-            &self.blocks.plan,
-            q,
-            free,
-        )?)
-    }
-
-    /// `q = U^T r` in the near blocks of a field `[3 free]` that is zero elsewhere.
-    pub fn project(&self, env: Env<'_>, r: &[f32], q: &mut [f32]) {
-        for range in &self.blocks.ranges {
-            q[range.clone()].fill(0.0);
-        }
-        project_rows(env.isa, &env.prior.basis(), &self.blocks.plan, r, q);
+        self.blocks.decode(env, q, free)
     }
 
     /// Adds `U^T (e_i w_j)` of vectors `w` at some places to `q [9,Q]`, field `3 i + j`.

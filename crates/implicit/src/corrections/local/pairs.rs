@@ -310,7 +310,7 @@ pub(in crate::corrections) struct Room {
     /// A field by place, or three at the free nodes; and one at those, or what three have of the modes.
     pub field: Vec<f32>,
     pub linear: Vec<f32>,
-    /// Those of the near blocks in which some coordinates are not all zero.
+    /// The blocks that the vectors of nine fields are of.
     pub used: Vec<Range<usize>>,
     /// By inside place: whether a pair does not know it; and the elements at those.
     pub unknown: Vec<bool>,
@@ -330,7 +330,7 @@ impl Room {
         near.elements.find(&self.unknown, &mut self.found)
     }
 
-    /// `linear [n,r] = Phi^T field` of up to three fields `[n, 3 free]`.
+    /// `linear [n,r] = Phi^T field` of up to three fields `[n, 3 free]` that are zero beyond the core and what is around it.
     pub fn on_modes(&mut self, env: Env<'_>, near: &NearSet, count: usize) -> Result<()> {
         let size = self.q.len();
         if self.nine.len() != 9 * size {
@@ -339,17 +339,9 @@ impl Room {
         let three = &mut self.nine[..count * size];
         let fields = self.field.chunks_exact((3 * near.places.free).max(1));
         for (field, q) in fields.zip(three.chunks_exact_mut(size)) {
-            near.project(env, field, q);
+            near.around.project(env, field, q);
         }
-        self.used.clear();
-        memory::fit(&mut self.used, near.blocks.ranges.len(), WHAT)?;
-        let is_used = |range: &&Range<usize>| {
-            let mut all = three.chunks_exact(size);
-            all.any(|q| q[(*range).clone()].iter().any(|q| *q != 0.0))
-        };
-        self.used
-            .extend(near.blocks.ranges.iter().filter(is_used).cloned());
-        env.on_modes_in(&self.used, three, &mut self.linear);
+        env.on_modes_in(&near.around.ranges, three, &mut self.linear);
         Ok(())
     }
 
