@@ -164,10 +164,13 @@ impl ContactProblem {
             tied,
             past,
             next,
+            near,
             ..
         } = self;
         // From here on `next` has the forces, grasps and ties of the last published step, and a step that fails leaves `past` as it was.
         next.take(past)?;
+        // Rows are of the samples of their step.
+        near.rows.clear();
         // Ties are told from those of the last step by what they join: a tie that goes on stays broken if it broke.
         tied.take(ties, next)?;
         next.tools.truncate(tools.len());

@@ -29,7 +29,9 @@ impl LocalSolver {
         // The direction for the loads that are there; then what the contact changes at its end, as a second answer of the same preconditioner.
         self.measured.work += self.set.near.direction_work();
         self.descend(step, problem)?;
+        self.decode_contact(step, problem)?;
         self.solve_contact(step, problem, base, way)?;
+        self.decode_direction(step)?;
         // What of the change along the direction is linear is computed once here; each part `t` of it then costs the near elements alone.
         let stiff = &mut self.d.stiff;
         step.preconditioner.stiffen(env, &self.d.step.c, stiff)?;
@@ -97,7 +99,7 @@ impl LocalSolver {
         self.d.step.clear(&self.set.near)?;
         self.precondition(step)?;
         self.pairs.ascend(env.isa, recursion, &mut self.d.step);
-        self.decode_direction(step)
+        Ok(())
     }
 
     /// Takes the work of the modes on the tools' loads off the reduced residual.
@@ -258,8 +260,23 @@ impl LocalSolver {
             }
         }
         env.work_of_modes(&self.spare.loads, &mut reduced.p);
-        self.precondition(step)?;
-        self.decode_direction(step)
+        self.precondition(step)
+    }
+
+    /// `Phi c` of the direction where the contact looks: by the core and what is around it, zero elsewhere, where the samples that it found last are there.
+    fn decode_contact(
+        &mut self,
+        step: &mut StepContext<'_>,
+        problem: &ContactProblem,
+    ) -> Result<()> {
+        let (env, near) = (step.context.env(), &self.set.near);
+        if !problem.rows_lie(|node| near.is_around(node)) {
+            return self.decode_direction(step);
+        }
+        let (around, q) = (&near.around, &mut self.spare.room.q);
+        resize(&mut self.d.modes, 3 * near.places.nodes.len())?;
+        env.near_coordinates(&self.d.step.c, &around.ranges, q);
+        around.decode(env, q, &mut self.d.modes[..3 * near.places.free])
     }
 
     /// `Phi c` of the direction at the near nodes.

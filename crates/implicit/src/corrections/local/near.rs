@@ -50,8 +50,9 @@ pub(in crate::corrections) struct NearSet {
     /// What of the far field's clusters is near.
     pub(super) parts: Parts,
     pub blocks: Blocks,
-    /// Those of the core and of the nodes that share an element with it alone.
+    /// Those of the core and of the nodes around it, which share an element with it; and those of the latter alone.
     pub around: Blocks,
+    pub ring: Blocks,
     /// How many of the parts that follow from the centres have been made for it.
     pub(super) made: u32,
 }
@@ -59,7 +60,7 @@ pub(in crate::corrections) struct NearSet {
 /// What is known of nodes while a set is filled.
 #[derive(HeldBytes)]
 struct Marks {
-    /// By node: within reach of a centre, and how many near elements it has.
+    /// By node: within reach of a centre, in a set that is filled of the core or around it; and how many near elements it has.
     is_reached: Vec<bool>,
     counts: Vec<u16>,
     /// Of the near nodes from the nearest centre, squared, mm².
@@ -113,9 +114,7 @@ impl Blocks {
     /// The field of coordinates `[Q]` at these nodes, into those rows of `out [3 free]`.
     pub fn decode(&self, env: Env<'_>, q: &[f32], out: &mut [f32]) -> Result<()> {
         let basis = env.prior.basis();
-        Ok(decode_rows(
-            env.isa, env.pool, &basis, &self.plan, q, out,
-        )?)
+        Ok(decode_rows(env.isa, env.pool, &basis, &self.plan, q, out)?)
     }
 
     /// `q = U^T r` in these blocks of a field `[3 free]` that is zero at other nodes.
@@ -149,6 +148,7 @@ impl NearSet {
             parts: Parts::default(),
             blocks: Blocks::new(env)?,
             around: Blocks::new(env)?,
+            ring: Blocks::new(env)?,
             made: 0,
         })
     }
@@ -190,8 +190,17 @@ impl NearSet {
         self.parts.fill(&self.elements, far, self.places.free)?;
         self.blocks.refill(env, &self.places, |_| true)?;
         self.mark_around();
-        let is_around = &self.marks.is_reached;
-        (self.around).refill(env, &self.places, |node| is_around[node as usize])
+        let (is_around, places) = (&self.marks.is_reached, &self.places);
+        let is_beyond = |node: u32| places.by_node()[node as usize] as usize >= places.core;
+        (self.around).refill(env, places, |node| is_around[node as usize])?;
+        (self.ring).refill(env, places, |node| {
+            is_around[node as usize] && is_beyond(node)
+        })
+    }
+
+    /// Whether a node is of the core or around it.
+    pub fn is_around(&self, node: u32) -> bool {
+        self.marks.is_reached[node as usize]
     }
 
     /// Marks the nodes of the core and those that share an element with it as reached, and no others that are near.

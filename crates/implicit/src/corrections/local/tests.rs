@@ -248,6 +248,7 @@ fn contact_has_the_compliance_of_the_preconditioner() {
         local.d.step.clear(&local.set.near).unwrap();
         resize(&mut local.d.modes, 3 * local.set.near.places.nodes.len()).unwrap();
         local.respond(&mut step).unwrap();
+        local.decode_direction(&mut step).unwrap();
         for to in 0..order {
             let node = nodes[columns[to / 3] as usize];
             let at = 3 * local.set.near.places.of(node).unwrap() + to % 3;
