@@ -29,7 +29,7 @@ impl Corrector {
             inertia: memory::zeros(len, WHAT)?,
             load: memory::zeros(if was.load.is_empty() { 0 } else { len }, WHAT)?,
             min_det: was.min_det,
-            level: was.level,
+            extent: was.extent,
             truncated_mm: was.truncated_mm,
             error_mm: was.error_mm,
             reaction: Vec::new(),

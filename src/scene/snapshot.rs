@@ -23,7 +23,7 @@ use crate::kernels::FlushToZero;
 use crate::stored;
 
 const MAGIC: &[u8; 8] = b"UPTSNAP\0";
-const VERSION: u32 = 24;
+const VERSION: u32 = 25;
 /// Magic and version.
 const HEAD: usize = MAGIC.len() + 4;
 const DIGEST: usize = 32;

@@ -4,6 +4,7 @@ use crate::clock::Instant;
 
 use super::Corrections;
 use super::boundary::Held;
+use super::extent::Extent;
 use super::group::Group;
 use super::load::Load;
 use super::precondition::Env;
@@ -22,8 +23,8 @@ pub struct Report {
     pub remaining_mm: f32,
     /// Root mean square over the nodes that the smoothing far from the tools has moved, mm: as much at least is out of balance there.
     pub far_mm: f32,
-    /// How far from the tools the next step iterates, a level of the near set.
-    pub level: usize,
+    /// How far from the tools the next step iterates.
+    pub extent: Extent,
     /// Root mean square error over the nodes, estimated before the bundle's calibration, mm.
     pub error_mm: f32,
     /// Smallest det F at the end.

@@ -1,6 +1,7 @@
 //! BDF2 over the steps of a solver: what it knows before a step, velocities and inertia after it, and the error of its length.
 
 use super::Integrator;
+use super::extent::Extent;
 use super::input::{Input, Report, SolverContext};
 use super::passes;
 use super::solver::ImplicitSolver;
@@ -171,7 +172,7 @@ impl ImplicitSolver {
         let own = &mut self.next;
         // Who knows better sets these after it: this is what a state has that no element was asked of.
         own.min_det = 1.0;
-        own.level = 0;
+        own.extent = Extent::default();
         own.truncated_mm = match truncated.is_finite() {
             true => truncated as f32,
             false => 0.0,

@@ -14,6 +14,7 @@ mod cut;
 mod cut_groups;
 mod cut_loads;
 mod estimate;
+mod extent;
 mod far;
 mod fields;
 mod free;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::local::LEVELS;
-use crate::error::{Error, Result};
+use super::extent::Extent;
+use crate::error::Result;
 use crate::memory::HeldBytes;
 use crate::{memory, stored};
 
@@ -24,8 +24,9 @@ pub struct Motion {
     pub load: Vec<f32>,
     /// Smallest det F of the last corrected state.
     pub min_det: f32,
-    /// How far from the tools the next step iterates, a level of the near set (`crates/implicit/src/corrections/local/near.rs`).
-    pub level: u32,
+    /// How far from the tools the next step iterates.
+    #[held(skip)]
+    pub extent: Extent,
     /// What a step of this length leaves out in the last state, and the whole estimated error of it, before the bundle's
     /// calibration: root mean squares over the nodes, mm. The error is 0 where nothing was corrected.
     pub truncated_mm: f32,
@@ -38,10 +39,10 @@ pub struct Motion {
 impl Motion {
     /// How far from the tools the next step iterates. What `moves_all` of the body brings all of it near: in a narrower set, what the modes near the tools do not
     /// span of it would gather from step to step, the faster the shorter the steps.
-    pub(super) fn reach(&self, moves_all: bool) -> usize {
+    pub(super) fn reach(&self, moves_all: bool) -> Extent {
         match moves_all {
-            true => LEVELS - 1,
-            false => self.level as usize,
+            true => self.extent.whole(),
+            false => self.extent,
         }
     }
 
@@ -53,7 +54,7 @@ impl Motion {
             inertia: memory::zeros(len, "inertia")?,
             load: Vec::new(),
             min_det: 1.0,
-            level: 0,
+            extent: Extent::default(),
             truncated_mm: 0.0,
             error_mm: 0.0,
             reaction: memory::room(len, "contact forces")?,
@@ -68,7 +69,7 @@ impl Motion {
             inertia,
             load,
             min_det,
-            level,
+            extent,
             truncated_mm,
             error_mm,
             reaction,
@@ -80,11 +81,7 @@ impl Motion {
         if !load.is_empty() {
             stored::check(load, len)?;
         }
-        if *level as usize >= LEVELS {
-            return Err(Error::Snapshot(format!(
-                "holds a reach of level {level}, there are {LEVELS}"
-            )));
-        }
+        extent.check()?;
         stored::check(&[*min_det, *truncated_mm, *error_mm], 3)?;
         stored::check(reaction, 3 * contacts)
     }
@@ -101,7 +98,7 @@ impl Motion {
             inertia: copied(&self.inertia)?,
             load: copied(&self.load)?,
             min_det: self.min_det,
-            level: self.level,
+            extent: self.extent,
             truncated_mm: self.truncated_mm,
             error_mm: self.error_mm,
             reaction: copied(&self.reaction)?,
@@ -121,7 +118,7 @@ impl Motion {
         self.load.clear();
         self.load.extend_from_slice(&other.load);
         self.min_det = other.min_det;
-        self.level = other.level;
+        self.extent = other.extent;
         self.truncated_mm = other.truncated_mm;
         self.error_mm = other.error_mm;
         self.reaction.clear();
@@ -136,7 +133,7 @@ impl Motion {
         self.inertia.fill(0.0);
         self.load.clear();
         self.min_det = 1.0;
-        self.level = 0;
+        self.extent = Extent::default();
         self.truncated_mm = 0.0;
         self.error_mm = 0.0;
         self.reaction.clear();

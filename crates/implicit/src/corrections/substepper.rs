@@ -144,7 +144,7 @@ impl Substepper {
         own.velocity.copy_from_slice(&last.velocity);
         own.inertia.copy_from_slice(&last.inertia);
         own.min_det = last.min_det;
-        own.level = last.level;
+        own.extent = last.extent;
         own.error_mm = last.error_mm;
         Ok(())
     }

@@ -98,7 +98,7 @@ impl ToolStep<'_> {
         self.solver.expect(self.context, self.input)?;
         self.solver.prepare(self.context, self.input)?;
         self.report = Report {
-            level: (self.solver.motion).reach(self.context.moves_all(self.input)),
+            extent: (self.solver.motion).reach(self.context.moves_all(self.input)),
             ..Report::default()
         };
         // Out of the solver while they are iterated on; the host's field gets the state only once it is whole.
@@ -121,7 +121,7 @@ impl ToolStep<'_> {
         // What fell back is a linear response, too, or no answer to the tools at all.
         let is_uncorrected = self.report.effort.iterations == 0 || self.report.fell_back;
         let uncorrected = is_uncorrected.then_some(went);
-        self.solver.next.level = self.report.level as u32;
+        self.solver.next.extent = self.report.extent;
         self.solver.end(&mut self.report, uncorrected)?;
         self.problem.finish(state(self.input, next), breaks);
         Ok(())

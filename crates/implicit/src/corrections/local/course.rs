@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::centres::is_by;
 use super::linear::WHAT;
 use super::linearisation::Linearisation;
-use super::near::LEVELS;
+use crate::corrections::extent::LEVELS;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 

@@ -42,6 +42,7 @@ use self::pairs::Pairs;
 use self::sets::{Coming, Set};
 use self::state::{Measured, Moved, Reach, Residuals, Spare};
 use self::step::{add, dot, resize};
+use super::extent::Extent;
 use super::far::FarField;
 use super::input::{Input, SolverContext};
 use super::precondition::{Env, Preconditioner};
@@ -51,7 +52,6 @@ use crate::memory::{self, HeldBytes};
 
 pub(super) use self::centres::add_centres;
 pub use self::course::Course;
-pub(super) use self::near::LEVELS;
 pub use self::record::Record;
 
 /// Far elements of a chunk that is near in part are looked at where its smallest det F is below this.
@@ -200,7 +200,7 @@ impl LocalSolver {
         let wanted = Wanted {
             rest,
             about: &coming.about,
-            level: self.reach.level,
+            level: self.reach.extent.level as usize,
             is_due: std::mem::take(&mut coming.is_due),
         };
         let level_of = |centres: &[u32], asked| level_of(far, rest, centres, asked);
@@ -261,17 +261,18 @@ impl LocalSolver {
         problem.work.is_bounded() && !self.set.near.places.is_all()
     }
 
-    /// The level that the next step begins with, `u` being the state of this one.
-    pub(super) fn next_level(&self, u: &[f32]) -> usize {
-        if self.reach.touched.is_empty() || self.coming.course.changes(self.reach.level) {
+    /// How far the next step reaches, `u` being the state of this one.
+    pub(super) fn next_extent(&self, u: &[f32]) -> Extent {
+        let extent = self.reach.extent;
+        if self.reach.touched.is_empty() || self.coming.course.changes(extent.level as usize) {
             // What moves then is not what a tool pushes; or a wider set is on its way.
-            return self.reach.level;
+            return extent;
         }
         let u = u.as_chunks::<3>().0;
         let squares = self.reach.touched.iter().map(|&node| u[node as usize]);
         let squares = squares.map(|u| u.iter().map(|u| u * u).sum::<f32>());
         let pushed_mm = squares.fold(0.0, f32::max).sqrt();
-        near::next_level(self.reach.level, self.measured.far_mm, pushed_mm)
+        extent.after(self.measured.far_mm, pushed_mm)
     }
 
     /// `|r_S - loads|`, µN: what is out of balance near the tools.

@@ -10,6 +10,7 @@ use ::elements::{ElementForces, Subset};
 use super::centres::{is_by, nearest_squared};
 use super::linear::{LinearElements, Parts, WHAT};
 use super::places::Places;
+use crate::corrections::extent::LEVELS;
 use crate::corrections::far::FarField;
 use crate::corrections::precondition::Env;
 use crate::error::Result;
@@ -19,11 +20,8 @@ use crate::memory::{self, HeldBytes};
 /// Nodes are near that lie this close to a centre at rest, mm, or as many mean edges of the mesh.
 const REACH_MM: f32 = 25.0;
 const REACH_EDGES: f32 = 3.0;
-/// Levels of the reach, and what multiplies it in each.
-pub(in crate::corrections) const LEVELS: usize = 4;
+/// What multiplies it in each level of the reach.
 const WIDER: [f32; LEVELS] = [1.0, 1.5, 2.25, f32::INFINITY];
-/// A set is too narrow where the far nodes are smoothed by more than this part of how far the touched ones have been pushed, or of a millimetre.
-const FAR_PART: f32 = 8e-5;
 /// A level beyond the first is not taken with more nodes than these, but the widest below it that has fewer.
 const MOST_NODES: usize = 4500;
 /// Where a larger part of the nodes would be near, all are, and so they are in a body of fewer nodes: whole, it costs no more than its modes do.
@@ -390,14 +388,4 @@ pub(super) fn level_of(far: &FarField, rest: &[f32], centres: &[u32], asked: usi
         near.take(MOST_NODES + 1).count() <= MOST_NODES
     };
     (1..=asked).rev().find(fits).unwrap_or(0)
-}
-
-/// The level of the next step, whose set is wider where the far nodes are out of balance: they were smoothed by `far_mm`, the touched ones have
-/// been pushed by `pushed_mm`. It is not narrower until the tools have left: under a tool that is held still the far nodes come to balance
-/// also in a set that is too narrow for the next motion.
-pub(in crate::corrections) fn next_level(level: usize, far_mm: f32, pushed_mm: f32) -> usize {
-    match far_mm > FAR_PART * pushed_mm.max(1.0) {
-        true => (level + 1).min(LEVELS - 1),
-        false => level,
-    }
 }

@@ -8,6 +8,7 @@ use super::linear::WHAT;
 use super::near::NearSet;
 use super::pairs::Room;
 use super::step::{Change, Step, resize};
+use crate::corrections::extent::Extent;
 use crate::corrections::precondition::Env;
 use crate::error::Result;
 use crate::kernels::vectors::PartialSums;
@@ -120,8 +121,9 @@ pub(in crate::corrections) struct Reach {
     pub about: Vec<u32>,
     /// Nodes that the tools touch, while a round begins.
     pub touched: Vec<u32>,
-    /// How far the next round reaches, a level of the near set.
-    pub level: usize,
+    /// How far the next round reaches.
+    #[held(skip)]
+    pub extent: Extent,
 }
 
 impl Reach {
@@ -130,7 +132,7 @@ impl Reach {
         Ok(Reach {
             about: memory::room(64, WHAT)?,
             touched: memory::room(256, WHAT)?,
-            level: 0,
+            extent: Extent::default(),
         })
     }
 }

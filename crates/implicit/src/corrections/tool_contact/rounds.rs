@@ -74,7 +74,7 @@ impl ToolStep<'_> {
             self.report.far_mm = local.measured.far_mm;
             // What a leap does to the far nodes says nothing of the reach.
             if !self.problem.ways.has_leapt {
-                self.report.level = local.next_level(at.u);
+                self.report.extent = local.next_extent(at.u);
             }
         }
         Ok(made.size)
@@ -150,10 +150,10 @@ impl ToolStep<'_> {
         let env = self.context.env();
         // The reach of the published state, not of the round before: a step that is made again reaches as far.
         let moves_all = self.context.moves_all(self.input);
-        let level = self.solver.motion.reach(moves_all);
+        let extent = self.solver.motion.reach(moves_all);
         let (local, mut step, problem) = self.local_solver()?;
         let nodes = problem.reached(&env.held.is);
-        local.reach.level = level;
+        local.reach.extent = extent;
         memory::replace(&mut local.reach.touched, nodes, "local iterations")?;
         let base = Base {
             u: at.u,
