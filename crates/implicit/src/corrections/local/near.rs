@@ -48,9 +48,8 @@ pub(in crate::corrections) struct NearSet {
     /// What of the far field's clusters is near.
     pub(super) parts: Parts,
     pub blocks: Blocks,
-    /// Those of the core and of the nodes around it, which share an element with it; and those of the latter alone.
+    /// Those of the core and of the nodes around it, which share an element with it.
     pub around: Blocks,
-    pub ring: Blocks,
     /// How many of the parts that follow from the centres have been made for it.
     pub(super) made: u32,
 }
@@ -146,7 +145,6 @@ impl NearSet {
             parts: Parts::default(),
             blocks: Blocks::new(env)?,
             around: Blocks::new(env)?,
-            ring: Blocks::new(env)?,
             made: 0,
         })
     }
@@ -188,12 +186,8 @@ impl NearSet {
         self.parts.fill(&self.elements, far, self.places.free)?;
         self.blocks.refill(env, &self.places, |_| true)?;
         self.mark_around();
-        let (is_around, places) = (&self.marks.is_reached, &self.places);
-        let is_beyond = |node: u32| places.by_node()[node as usize] as usize >= places.core;
-        (self.around).refill(env, places, |node| is_around[node as usize])?;
-        (self.ring).refill(env, places, |node| {
-            is_around[node as usize] && is_beyond(node)
-        })
+        let is_around = &self.marks.is_reached;
+        (self.around).refill(env, &self.places, |node| is_around[node as usize])
     }
 
     /// Whether a node is of the core or around it.

@@ -330,7 +330,7 @@ impl Room {
         near.elements.find(&self.unknown, &mut self.found)
     }
 
-    /// `linear [n,r] = Phi^T field` of up to three fields `[n, 3 free]` that are zero but around the core.
+    /// `linear [n,r] = Phi^T field` of up to three fields `[n, 3 free]` that are zero beyond the core and what is around it.
     pub fn on_modes(&mut self, env: Env<'_>, near: &NearSet, count: usize) -> Result<()> {
         let size = self.q.len();
         if self.nine.len() != 9 * size {
@@ -339,9 +339,9 @@ impl Room {
         let three = &mut self.nine[..count * size];
         let fields = self.field.chunks_exact((3 * near.places.free).max(1));
         for (field, q) in fields.zip(three.chunks_exact_mut(size)) {
-            near.ring.project(env, field, q);
+            near.around.project(env, field, q);
         }
-        env.on_modes_in(&near.ring.ranges, three, &mut self.linear);
+        env.on_modes_in(&near.around.ranges, three, &mut self.linear);
         Ok(())
     }
 
