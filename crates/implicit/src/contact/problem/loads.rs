@@ -5,7 +5,6 @@ use ::contact::grasp::tension;
 
 use super::ContactProblem;
 use crate::contact::past::Force;
-use crate::contact::rows::Row;
 use crate::contact::state::{State, vector};
 use crate::contact::ties::NO_TOOL;
 use crate::contact::tool::{ContactReport, Push, ToolReading};
@@ -38,19 +37,6 @@ impl ContactProblem {
             let own = sample.entries().map(|entry| entry.0);
             nodes.extend(own.filter(|node| !held[*node as usize]));
         }
-    }
-
-    /// Whether the last look of the step found rows, and all their nodes are where `is_there` says.
-    pub fn rows_lie(&self, is_there: impl Fn(u32) -> bool) -> bool {
-        let points = self.tied.points(&self.surface.samples);
-        let rows = &self.near.rows;
-        let lies = |row: &Row| {
-            points
-                .at(row.sample)
-                .entries()
-                .all(|(node, _)| is_there(node))
-        };
-        !rows.is_empty() && rows.iter().all(lies)
     }
 
     /// Calls with each node's share of the forces on the tissue, mN.

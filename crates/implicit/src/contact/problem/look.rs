@@ -10,7 +10,7 @@ use crate::contact::past::Past;
 use crate::contact::rows::WHAT;
 use crate::contact::rows::{Pair, Row};
 use crate::contact::state::State;
-use crate::contact::ties::NO_TOOL;
+use crate::contact::ties::{NO_TOOL, Points};
 use crate::contact::tool::MAX_TOOLS;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
@@ -32,9 +32,9 @@ pub struct Look {
 #[derive(HeldBytes)]
 pub struct NearRows {
     /// What the last look found, ascending by tool and sample, then the ties.
-    pub rows: Vec<Row>,
+    pub(in crate::contact) rows: Vec<Row>,
     /// Rows that a solve had no room for: their forces go.
-    pub shed: Vec<Row>,
+    pub(in crate::contact) shed: Vec<Row>,
     /// Samples that the last look found.
     pub found: usize,
 }
@@ -47,6 +47,17 @@ impl NearRows {
             shed: memory::room(2 * MOST_ROWS, WHAT)?,
             found: 0,
         })
+    }
+
+    /// Whether the last look of the step found rows, and all their nodes are where `is_there` says.
+    pub fn lie(&self, points: Points<'_>, is_there: impl Fn(u32) -> bool) -> bool {
+        let lies = |row: &Row| {
+            points
+                .at(row.sample)
+                .entries()
+                .all(|(node, _)| is_there(node))
+        };
+        !self.rows.is_empty() && self.rows.iter().all(lies)
     }
 
     /// Fills the rows: samples near the tools, those that are pushed, and those that are held; at the end of the

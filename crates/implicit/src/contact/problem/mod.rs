@@ -62,7 +62,7 @@ pub struct ContactProblem {
     pub past: Past,
     /// Of the step being made.
     pub next: Past,
-    near: NearRows,
+    pub near: NearRows,
     pub solution: Solution,
     pub kept: KeptForces,
     /// What the step may still cost.

@@ -88,7 +88,7 @@ impl TieSet {
     }
 
     /// Nodes and weights of all rows, those of samples and those of ties.
-    pub(super) fn points<'a>(&'a self, samples: &'a Samples) -> Points<'a> {
+    pub fn points<'a>(&'a self, samples: &'a Samples) -> Points<'a> {
         Points {
             samples,
             ties: &self.list,

@@ -128,9 +128,9 @@ impl LocalSolver {
                 add(1.0, &force, &mut field[place..]);
             }
         });
-        near.blocks.project(env, field, &mut self.spare.room.q);
+        near.blocks.all.project(env, field, &mut self.spare.room.q);
         let work = &mut self.spare.on_modes;
-        env.on_modes_in(&near.blocks.ranges, &self.spare.room.q, work);
+        env.on_modes_in(&near.blocks.all.ranges, &self.spare.room.q, work);
         add(-1.0, work, p);
         Ok(())
     }
@@ -183,9 +183,9 @@ impl LocalSolver {
         add(1.0, &self.spare.solved, &mut self.d.step.c);
         add(1.0, t, &mut self.d.step.t);
         // What the modes do in the core and around it is all that the core asks for.
-        env.near_coordinates(&self.spare.solved, &near.around.ranges, &mut room.q);
+        env.near_coordinates(&self.spare.solved, &near.blocks.around.ranges, &mut room.q);
         resize(&mut room.linear, 3 * near.places.free)?;
-        near.around.decode(env, &room.q, &mut room.linear)?;
+        near.blocks.around.decode(env, &room.q, &mut room.linear)?;
         // In the core the field that the move of the modes stretches over it takes its place.
         self.set.factor.stretch(&room.linear, t);
         self.set.factor.solve(env.isa, t);
@@ -270,10 +270,11 @@ impl LocalSolver {
         problem: &ContactProblem,
     ) -> Result<()> {
         let (env, near) = (step.context.env(), &self.set.near);
-        if !problem.rows_lie(|node| near.is_around(node)) {
+        let points = problem.tied.points(&problem.surface.samples);
+        if !problem.near.lie(points, |node| near.is_around(node)) {
             return self.decode_direction(step);
         }
-        let (around, q) = (&near.around, &mut self.spare.room.q);
+        let (around, q) = (&near.blocks.around, &mut self.spare.room.q);
         resize(&mut self.d.modes, 3 * near.places.nodes.len())?;
         env.near_coordinates(&self.d.step.c, &around.ranges, q);
         around.decode(env, q, &mut self.d.modes[..3 * near.places.free])
@@ -282,7 +283,7 @@ impl LocalSolver {
     /// `Phi c` of the direction at the near nodes.
     pub(super) fn decode_direction(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
-        let (ranges, q) = (&self.set.near.blocks.ranges, &mut self.spare.room.q);
+        let (ranges, q) = (&self.set.near.blocks.all.ranges, &mut self.spare.room.q);
         env.near_coordinates(&self.d.step.c, ranges, q);
         self.set.near.decode(env, q, &mut self.d.modes)
     }

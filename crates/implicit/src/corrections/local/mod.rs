@@ -351,8 +351,8 @@ impl LocalSolver {
             &mut self.spare.room.q,
             &mut self.residuals.next.p,
         );
-        near.blocks.project(env, &self.spare.room.field, q);
-        env.on_modes_in(&near.blocks.ranges, q, &mut self.spare.on_modes);
+        near.blocks.all.project(env, &self.spare.room.field, q);
+        env.on_modes_in(&near.blocks.all.ranges, q, &mut self.spare.on_modes);
         self.spare.more_on_modes.copy_from_slice(&self.now.step.c);
         add(t, &self.d.step.c, &mut self.spare.more_on_modes);
         let far_det = (self.clusters).added_on_modes(env, far, &self.spare.more_on_modes, p)?;

@@ -47,9 +47,7 @@ pub(in crate::corrections) struct NearSet {
     pub(super) elements: LinearElements,
     /// What of the far field's clusters is near.
     pub(super) parts: Parts,
-    pub blocks: Blocks,
-    /// Those of the core and of the nodes around it, which share an element with it.
-    pub around: Blocks,
+    pub blocks: NearBlocks,
     /// How many of the parts that follow from the centres have been made for it.
     pub(super) made: u32,
 }
@@ -78,6 +76,13 @@ pub(in crate::corrections) struct Blocks {
     plan: RowPlan,
     /// Their coordinates.
     pub ranges: Vec<Range<usize>>,
+}
+
+/// Those of all near nodes, and of the core with the nodes around it, which share an element with it.
+#[derive(HeldBytes)]
+pub(in crate::corrections) struct NearBlocks {
+    pub all: Blocks,
+    pub around: Blocks,
 }
 
 impl Blocks {
@@ -143,8 +148,10 @@ impl NearSet {
             },
             elements: LinearElements::default(),
             parts: Parts::default(),
-            blocks: Blocks::new(env)?,
-            around: Blocks::new(env)?,
+            blocks: NearBlocks {
+                all: Blocks::new(env)?,
+                around: Blocks::new(env)?,
+            },
             made: 0,
         })
     }
@@ -184,10 +191,10 @@ impl NearSet {
         });
         self.elements.take_places(self.places.by_node());
         self.parts.fill(&self.elements, far, self.places.free)?;
-        self.blocks.refill(env, &self.places, |_| true)?;
+        self.blocks.all.refill(env, &self.places, |_| true)?;
         self.mark_around();
         let is_around = &self.marks.is_reached;
-        (self.around).refill(env, &self.places, |node| is_around[node as usize])
+        (self.blocks.around).refill(env, &self.places, |node| is_around[node as usize])
     }
 
     /// Whether a node is of the core or around it.
@@ -341,12 +348,18 @@ impl NearSet {
     pub fn decode(&self, env: Env<'_>, q: &[f32], out: &mut [f32]) -> Result<()> {
         let (free, held) = out.split_at_mut(3 * self.places.free);
         held.fill(0.0);
-        self.blocks.decode(env, q, free)
+        self.blocks.all.decode(env, q, free)
     }
 
     /// Adds `U^T (e_i w_j)` of vectors `w` at some places to `q [9,Q]`, field `3 i + j`.
     pub fn project_products(&self, env: Env<'_>, vectors: &[(u32, [f32; 3])], q: &mut [f32]) {
-        project_products(env.isa, &env.prior.basis(), &self.blocks.plan, vectors, q);
+        project_products(
+            env.isa,
+            &env.prior.basis(),
+            &self.blocks.all.plan,
+            vectors,
+            q,
+        );
     }
 
     /// Coordinates of the blocks that some places are of.
@@ -359,7 +372,7 @@ impl NearSet {
         let offsets = env.prior.basis().rank_offsets;
         ranges.clear();
         for (place, _) in vectors {
-            let block = self.blocks.plan.block_of(*place);
+            let block = self.blocks.all.plan.block_of(*place);
             let own = offsets[block] as usize..offsets[block + 1] as usize;
             if !ranges.contains(&own) {
                 memory::push(ranges, own, WHAT)?;

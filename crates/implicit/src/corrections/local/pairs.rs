@@ -176,7 +176,7 @@ impl Pairs {
             }
             resize(&mut room.field, 3 * near.places.nodes.len())?;
             resize(&mut room.linear, 3 * near.places.free)?;
-            env.near_coordinates(&step.c, &near.blocks.ranges, &mut room.q);
+            env.near_coordinates(&step.c, &near.blocks.all.ranges, &mut room.q);
             near.decode(env, &room.q, &mut room.field)?;
             add(1.0, &step.t, &mut room.field);
             near.linear(env, &room.field, Some(&room.found), &mut room.linear);
@@ -339,9 +339,9 @@ impl Room {
         let three = &mut self.nine[..count * size];
         let fields = self.field.chunks_exact((3 * near.places.free).max(1));
         for (field, q) in fields.zip(three.chunks_exact_mut(size)) {
-            near.around.project(env, field, q);
+            near.blocks.around.project(env, field, q);
         }
-        env.on_modes_in(&near.around.ranges, three, &mut self.linear);
+        env.on_modes_in(&near.blocks.around.ranges, three, &mut self.linear);
         Ok(())
     }
 
