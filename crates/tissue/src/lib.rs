@@ -17,6 +17,7 @@ pub mod material {
     pub use elements::{Material, MaterialError};
 }
 
+pub mod axisymmetric;
 pub mod baselines;
 pub mod contact;
 pub mod dataset;

@@ -7,6 +7,7 @@ use elements::{Deformation, Law, Material, Moduli, Ogden, stress};
 use tissue::mesh::{Mesh, regular_box};
 use tissue::statics::relax;
 
+use super::between_plates::{self, limit};
 use super::equilibrium::{ends, forces};
 use super::section::Section;
 use super::torsion::torsion;
@@ -18,6 +19,8 @@ const ROD: [f32; 3] = [10.0, 10.0, 30.0];
 const RADIUS: f64 = 5.0;
 const LENGTH: f64 = 10.0;
 const TWIST: f64 = 0.04;
+/// Strain of the cylinder between plates.
+const SQUEEZE: f64 = 0.1;
 /// Cells across the cylinder, the second twice the first.
 const CELLS: [usize; 2] = [10, 20];
 
@@ -96,6 +99,27 @@ fn twisted(material: &Material, cells: usize) -> Result<[f64; 2]> {
     Ok([torque, normal])
 }
 
+/// Force that presses the cylinder by a tenth of its length between plates that hold its ends, mN.
+fn squeezed(material: &Material, cells: usize) -> Result<f64> {
+    let mesh = cylinder(cells)?;
+    let held = ends(&mesh, LENGTH as f32);
+    let start: Vec<[f32; 3]> = (mesh.positions.iter())
+        .map(|p| [0.0, 0.0, -SQUEEZE as f32 * p[2]])
+        .collect();
+    let u = relax(&mesh, &held.concat(), material, &start)?;
+    let forces = forces(&mesh, material, &u);
+    Ok(held[0].iter().map(|node| forces[*node as usize][2]).sum())
+}
+
+/// The same by the tetrahedra and by the body of revolution, both in the limit of two meshes.
+pub fn squeezed_both(material: &Material) -> Result<[f64; 2]> {
+    let [coarse, fine] = CELLS.map(|cells| squeezed(material, cells));
+    let turned = [[10, 10], [20, 20]]
+        .map(|cells| between_plates::held([RADIUS, 0.5 * LENGTH], material, SQUEEZE, 1, cells));
+    let [few, many] = turned;
+    Ok([limit(coarse?, fine?), limit(few?[0], many?[0])])
+}
+
 pub fn section() -> Result<Section> {
     let cortex = materials::law("cortex").map_err(anyhow::Error::msg)?;
     let laws = [("neo-Hookean", Law::default()), ("cortex", cortex)];
@@ -121,13 +145,12 @@ pub fn section() -> Result<Section> {
         let want = torsion(&terms, RADIUS, TWIST);
         let [coarse, fine] = CELLS;
         let (coarse, fine) = (twisted(&material, coarse)?, twisted(&material, fine)?);
-        // The error of linear elements goes with the square of their size.
-        let limit = [0, 1].map(|k| fine[k] + (fine[k] - coarse[k]) / 3.0);
+        let both = [0, 1].map(|k| limit(coarse[k], fine[k]));
         let [few, many] = CELLS.map(|cells| format!("{cells} elements across"));
         for (got, mesh) in [
             (coarse, few),
             (fine, many),
-            (limit, "both, in the limit".into()),
+            (both, "both, in the limit".into()),
         ] {
             row(
                 &format!("cylinder, {mesh}: torque"),

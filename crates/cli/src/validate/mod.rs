@@ -3,9 +3,11 @@
 //! The data of others stay where they are: `--data FOLDER` names a folder with `brain.csv` and `silicone.csv`, whose columns
 //! `docs/reference/formats.md` describes. Without it the closed forms and the published relaxation alone are run.
 
+mod between_plates;
 mod brain;
 mod closed_forms;
 mod equilibrium;
+mod half_space;
 mod relaxing_rod;
 mod section;
 mod silicone;
@@ -40,9 +42,11 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         sections.push(brain::section(&folder.join("brain.csv"))?);
         sections.push(specimens::section(&folder.join("brain.csv"))?);
         sections.push(silicone::section(&folder.join("silicone.csv"))?);
+        sections.push(between_plates::section(&folder.join("silicone.csv"))?);
     }
     sections.push(relaxing_rod::section()?);
     sections.push(closed_forms::section()?);
+    sections.push(half_space::section()?);
     for section in &sections {
         println!("{}\n", section.text);
         if let Some(page) = &options.markdown {

@@ -17,12 +17,12 @@ use crate::fit::plot;
 use crate::fit::stretches::best;
 
 /// Median and worst relative error of the force that are promised.
-const BAR: [f64; 2] = [0.05, 0.10];
+pub const BAR: [f64; 2] = [0.05, 0.10];
 /// Radius of the cylinders, mm.
-const RADIUS_MM: f64 = 25.0;
+pub const RADIUS_MM: f64 = 25.0;
 /// Largest strain of the fit, and the largest of each range that is predicted; a margin for the rounding of the file.
-const FITTED: f64 = 0.2 + MARGIN;
-const PREDICTED: [f64; 2] = [0.3 + MARGIN, 0.4 + MARGIN];
+pub const FITTED: f64 = 0.2 + MARGIN;
+pub const PREDICTED: [f64; 2] = [0.3 + MARGIN, 0.4 + MARGIN];
 const MARGIN: f64 = 1e-6;
 const LAWS: [(&str, Wanted); 3] = [
     ("neo-Hookean", Wanted::NeoHookean),
@@ -30,15 +30,15 @@ const LAWS: [(&str, Wanted); 3] = [
     ("Ogden, 1 term", Wanted::Ogden(1)),
 ];
 
-struct Phantom {
-    name: String,
-    whole: Curve,
-    fitted: Curve,
+pub struct Phantom {
+    pub name: String,
+    pub whole: Curve,
+    pub fitted: Curve,
     /// Largest standard deviation over the mean between 20 and 30 %.
-    spread: f64,
+    pub spread: f64,
 }
 
-fn read(path: &Path) -> Result<Vec<Phantom>> {
+pub fn read(path: &Path) -> Result<Vec<Phantom>> {
     let table = Table::read(path)?;
     let [name, strain, force, spread] = [
         &["phantom", "sample"][..],
@@ -86,18 +86,22 @@ fn read(path: &Path) -> Result<Vec<Phantom>> {
     Ok(phantoms)
 }
 
-/// Root mean square and largest relative error of the force beyond the fit, up to a strain.
-fn errors(phantom: &Phantom, law: &Ogden, up_to: f64) -> [f64; 2] {
-    let beyond = phantom.whole.points.iter();
-    let relative: Vec<f64> = beyond
+/// Root mean square and largest relative error of the force beyond the fit, up to a strain, of a stress by stretch.
+pub fn beyond(curve: &Curve, stress: impl Fn(f64) -> f64, up_to: f64) -> [f64; 2] {
+    let relative: Vec<f64> = (curve.points.iter())
         .filter(|[x, _]| 1.0 - x > FITTED && 1.0 - x <= up_to)
-        .map(|[x, y]| nominal_stress(law, Mode::Compression, *x) / y - 1.0)
+        .map(|[x, y]| stress(*x) / y - 1.0)
         .collect();
     let square = relative.iter().map(|e| e * e).sum::<f64>() / relative.len() as f64;
     [
         square.sqrt(),
         relative.iter().fold(0.0, |m, e| e.abs().max(m)),
     ]
+}
+
+fn errors(phantom: &Phantom, law: &Ogden, up_to: f64) -> [f64; 2] {
+    let stress = |x| nominal_stress(law, Mode::Compression, x);
+    beyond(&phantom.whole, stress, up_to)
 }
 
 pub fn section(path: &Path) -> Result<Section> {
