@@ -2423,7 +2423,7 @@ upt_status upt_haptics_destroy(struct upt_haptics *haptics);
  * The scene remembers what each place of the array touches until the array's length changes or `upt_scene_reset`: pass
  * every instrument every time, in the same order. NULL with count 0 releases all.
  *
- * - `instruments`: at most 64, all with the same `struct_size`, of every shape that `upt_scene_step_instruments` takes.
+ * - `instruments`: at most 64, all with the same `struct_size`, of every shape that `upt_scene_step` takes.
  * - `contact_nodes`: `[capacity]`, `contact_vectors`: `[capacity,3]`, mm; both may be NULL with capacity 0, which only
  *   queries the count.
  * - `contact_count`: number of contacts found, always written.

@@ -71,6 +71,29 @@ fn each_step_is_there_with_what_it_did_inside_of_it() {
             assert!(inside.contains(name), "step {number}: {name} of {inside:?}");
         }
     }
+    // What came out of a step stands beside its number.
+    let of = |events: &[Value], number: usize| {
+        let mut steps = events.iter().filter(|one| one["name"] == "step");
+        steps.nth(number).unwrap()["args"]["of"]
+            .as_str()
+            .unwrap()
+            .to_owned()
+    };
+    let last = of(&events(&file), 3);
+    let told = fixture::host::stats(host.scene);
+    let counts = format!(
+        "step=3 contacts={} corrections={} ",
+        told.contact_count, told.corrections
+    );
+    assert!(
+        last.starts_with(&counts) && told.contact_count > 0,
+        "{last}"
+    );
+    assert!(
+        last.contains("error_mm=") && last.ends_with(&format!("flags={}", told.flags)),
+        "{last}"
+    );
+    submitted_steps_are_there_on_the_workers_thread(&host, &file);
     // A trace makes no messages, and a receiver that wants few gets few.
     let level = UPT_LOG_WARN;
     assert_eq!(
@@ -86,5 +109,27 @@ fn each_step_is_there_with_what_it_did_inside_of_it() {
             .filter(|one| one["name"] == name)
             .count()
     };
-    assert_eq!((named("step"), named("open")), (5, 1));
+    assert_eq!((named("step"), named("open")), (6, 1));
+}
+
+/// As the fifth step, with what it did inside of it.
+fn submitted_steps_are_there_on_the_workers_thread(host: &Host, file: &Path) {
+    let tool = ball(host, 0.9);
+    let mut input: upt_input = unsafe { std::mem::zeroed() };
+    input.struct_size = size_of::<upt_input>() as u32;
+    (input.instruments, input.instrument_count) = (&tool, 1);
+    assert_eq!(unsafe { upt_scene_submit(host.scene, &input) }, UPT_OK);
+    assert_eq!(unsafe { upt_scene_wait(host.scene, 60_000) }, UPT_OK);
+    let events = events(file);
+    let steps: Vec<&Value> = events.iter().filter(|one| one["name"] == "step").collect();
+    let (own, workers) = (&steps[0]["tid"], &steps[4]["tid"]);
+    assert_ne!(own, workers);
+    let inside: HashSet<&str> = events
+        .iter()
+        .filter(|one| one["tid"] == *workers)
+        .filter_map(|one| one["name"].as_str())
+        .collect();
+    for name in ["step", "search", "corrections", "guess", "iteration"] {
+        assert!(inside.contains(name), "{name} of {inside:?}");
+    }
 }

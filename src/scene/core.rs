@@ -5,6 +5,9 @@
 use crate::clock::Instant;
 use std::sync::RwLock;
 
+use tracing::Span;
+use tracing::field::Empty;
+
 use super::StepInput;
 use super::hands::Hands;
 use super::maker::StepMaker;
@@ -51,7 +54,7 @@ impl Core {
         let _mode = FlushToZero::of(self.maker.machine.isa);
         let start = Instant::now();
         let step_count = self.maker.states.counters.step_count;
-        let _span = tracing::debug_span!("step", step = step_count).entered();
+        let span = new_span(step_count).entered();
         let mut stats = self.blank_stats();
         if let Some(out) = &out {
             lock_read(published).check_len(View::Region, out.len())?;
@@ -90,6 +93,7 @@ impl Core {
         }
         // The flags belong to the step that has just been counted.
         self.maker.watch.tell(stats.step_count, &stats);
+        record(&span, &stats);
         stats.timing.step_ms = start.elapsed().as_secs_f64() * 1e3;
         lock_write(published).stats = stats;
         Ok(())
@@ -105,6 +109,26 @@ impl Core {
             + contacts_in_the_hosts_order
             + self.hands.memory_bytes()
     }
+}
+
+/// The span of a step; what comes out of it is filled in by [`record`], and stays empty where the step fails.
+fn new_span(step: u64) -> Span {
+    tracing::debug_span!(
+        "step",
+        step,
+        contacts = Empty,
+        corrections = Empty,
+        error_mm = Empty,
+        flags = Empty
+    )
+}
+
+/// What a profiler shows beside the time of a step.
+fn record(span: &Span, stats: &SceneStats) {
+    span.record("contacts", stats.contact_count);
+    span.record("corrections", stats.corrections);
+    span.record("error_mm", stats.error_mm);
+    span.record("flags", stats.flags);
 }
 
 /// What a step has taken of its input.

@@ -95,8 +95,11 @@ more() {
   check "upt doctor opens a bundle with NEON kernels" grep -q 'kernels neon' <<<"$text"
   lanes "$text"
   portable "$1"
+  make_wheel "$1/libupt.so" linux_aarch64
+  check "the wheel is tagged manylinux for aarch64, and what it says of itself is so" \
+    python3 tests/cross/wheel_file.py "$build"/wheels/*-manylinux_*_aarch64.whl
   if [ "$nightly" = 1 ]; then
-    wheel "$1"
+    wheel
   else
     leave_out "$(grep -h '^def test_' python/tests/test_*.py | wc -l)" "tests of the Python wheel in Debian's Python for arm64: nightly"
   fi
@@ -114,8 +117,6 @@ portable() {
 
 # The wheel in Debian's Python for arm64: it finds its own libupt, and ONNX Runtime in the package onnxruntime.
 wheel() {
-  make_wheel "$1/libupt.so" linux_aarch64
-  check "the wheel is tagged manylinux for aarch64" compgen -G "$build/wheels/*-manylinux_*_aarch64.whl"
   local python="$root/target/cross/python-arm64"
   if ! debian_python "$python"; then
     fail "Debian's Python for arm64 was not unpacked"

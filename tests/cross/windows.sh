@@ -95,7 +95,8 @@ more() {
 wheel() {
   make_wheel "$1/upt.dll" win_amd64
   local inside="$build/wheel/upt/lib/upt.dll"
-  check "the wheel is tagged win_amd64 and holds upt.dll" test -e "$build"/wheels/*-win_amd64.whl -a -e "$inside"
+  check "the wheel is tagged win_amd64, and what it says of itself is so" \
+    python3 tests/cross/wheel_file.py "$build"/wheels/*-win_amd64.whl
   x86_64-w64-mingw32-objdump -p "$inside" | sed -n 's/^.*\[ *[0-9]*\].* \(upt_[a-z_]*\)$/\1/p' >"$build/wheel.exports"
   check "its dll exports what the package calls" python3 tests/cross/wheel_calls.py "$build/wheel" "$build/wheel.exports"
   local path

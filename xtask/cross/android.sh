@@ -2,7 +2,7 @@
 #
 # Android's C library and the unwinder that panics need come with Google's NDK, which no package registry has. In their place are
 # libraries that hold nothing: what they would give stays open in the library, and tests/cross/android.py reads what that is.
-if ! has_own; then
+if ! has_own "$triple"; then
   echo "Rust's standard library for $triple is missing, and Debian has none: rustup target add $triple" >&2
   exit 1
 fi

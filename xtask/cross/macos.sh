@@ -3,7 +3,7 @@
 # What links is LLVM's linker of Rust's own toolchain. Of macOS it needs no more than a text that lists what the system's libraries
 # export. The package `ziglang` of PyPI carries one for libSystem, which is taken out of it; libc and libm are libSystem by other
 # names, and of libiconv and libc++ no more than a few names are needed.
-if ! has_own; then
+if ! has_own "$triple"; then
   echo "Rust's standard library for $triple is missing, and Debian has none: rustup target add $triple" >&2
   exit 1
 fi

@@ -3,7 +3,7 @@
 # What links is LLVM's linker of Rust's own toolchain, as `lld-link`. An import library only says which DLL exports which name. Those of
 # Windows itself are MinGW's; those of Microsoft's C runtime are made here of the names that Rust's code asks for, and what that runtime
 # puts into each library besides is msvc_start.c. On Windows the library needs vcruntime140.dll, as all of that toolchain's do.
-if ! has_own; then
+if ! has_own "$triple"; then
   echo "Rust's standard library for $triple is missing, and Debian has none: rustup target add $triple" >&2
   exit 1
 fi

@@ -54,12 +54,9 @@ CONF
   echo "$version" >"$cross/rust/version"
 }
 
-has_own() {
-  compgen -G "$(rustc --print target-libdir --target "$triple")/libstd-*" >/dev/null
-}
-if ! has_own && [ ! -e "$cross/rust/version" ] && command -v rustup >/dev/null; then
-  mkdir -p "$cross"
-  timeout 300 rustup target add "$triple" >"$cross/rustup.log" 2>&1 || echo "rustup cannot add $triple: taking Debian's library" >&2
+source "$root/xtask/cross/target.sh"
+if ! has_own "$triple" && [ ! -e "$cross/rust/version" ] && ! add_own "$triple"; then
+  echo "rustup gives no standard library for $triple: taking Debian's" >&2
 fi
 host="$(rustc -vV | sed -n 's/^host: //p')"
 UPT_LLD="$(rustc --print sysroot)/lib/rustlib/$host/bin/rust-lld"
@@ -69,7 +66,7 @@ case "$triple" in
   aarch64-linux-android) source "$root/xtask/cross/android.sh" ;;
   x86_64-pc-windows-msvc) source "$root/xtask/cross/msvc.sh" ;;
 esac
-if ! has_own; then
+if ! has_own "$triple"; then
   if [ ! -e "$cross/rust/version" ]; then
     unpack_debian
   fi

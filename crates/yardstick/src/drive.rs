@@ -18,9 +18,9 @@ use crate::bundle_folder::BundleFolder;
 /// A way to drive it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drive {
-    /// `upt_scene_step_instruments`: contact is solved in the step.
+    /// `upt_scene_step` with `instruments`: contact is solved in the step.
     Solved,
-    /// `upt_scene_contacts_from_instruments`, then `upt_scene_step_contacts`: each touched node is projected on its own.
+    /// `upt_scene_contacts_from_instruments`, then `upt_scene_step` with `contact_nodes`: each touched node is projected on its own.
     Geometric,
     /// The linear response of the bundle's tables alone, contact solved as without corrections.
     Linear,
