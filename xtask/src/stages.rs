@@ -49,7 +49,7 @@ const HAPTICS: &str =
 pub const STAGES: &[&[&[Stage]]] = &[
     &[&[
         stage("fmt", "cargo fmt --check", "", Cargo("fmt --all --check")),
-        stage("clippy", "cargo clippy, warnings are errors; also without features, for WebAssembly and for Windows", "", Function(clippy)),
+        stage("clippy", "cargo clippy, warnings are errors; also without features, nightly for WebAssembly and for Windows", "", Function(clippy)),
         stage("rustdoc", "cargo doc of the libraries, warnings are errors", "", Function(rustdoc)),
         stage("style", "ruff, clang-format, dependencies, licences, circles and upward imports, sizes of files", "", Function(style)),
         stage("abi", "bindings are fresh, and the last release's C ABI stands", "", Function(abi)),
@@ -79,7 +79,7 @@ pub const STAGES: &[&[&[Stage]]] = &[
 pub const NIGHTLY: &[&[&[Stage]]] = &[&[&[
     stage("haptics", "a day of simulated haptics, or what fits into 20 minutes", system::NATIVE, Cargo(HAPTICS)),
     stage("races", "what threads share: Miri, ThreadSanitizer", "", Script("tests/races/run.sh nightly")),
-    stage("windows", "built by MinGW, run by Wine; every run compiles for it in the stage clippy", system::WINDOWS, Function(cross::windows)),
+    stage("windows", "built by MinGW, run by Wine", system::WINDOWS, Function(cross::windows)),
     stage("arm64", "Linux arm64, run by qemu", system::ARM64, Function(cross::arm64)),
     stage("linked", "macOS, MSVC and Android: linked, the files read, MSVC's run by Wine", system::WINDOWS, Function(cross::linked_stage)),
 ]]];
