@@ -1,68 +1,126 @@
 //! Dense kernels of a front, upper triangle, row-major.
 
+use lanes::{DenseLanes, load_some, store_some};
+
 /// Rows of `U` that are made before the others are changed by them.
 const PANEL: usize = 8;
+/// Rows that take a panel off together, and registers of each: their sums stay in registers while the panel passes.
+const ROWS: usize = 4;
+const REGISTERS: usize = 2;
 /// Partial sums of an inner product.
 const LANES: usize = 16;
 
 lanes::by_isa! {
     /// The first `own` rows of `[width, width]` become rows of `U` with the inverse on the diagonal, the others what is left; whether all
-    /// pivots are positive.
-    pub fn eliminate(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) = eliminate_lanes, eliminate_plain;
+    /// pivots are positive. What stands below the diagonal is not read, and has no meaning afterwards.
+    pub fn eliminate(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) = eliminate_lanes, eliminate_scalar;
 }
 
-/// Compiled with the instructions of `L`; the compiler makes the vectors.
-#[inline(always)]
-// `#[target_feature]` of `by_isa!` reaches what is inlined here: the same source, other vectors.
-unsafe fn eliminate_lanes<L>(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) {
-    eliminate_plain(a, width, own, is_positive);
+fn eliminate_scalar(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) {
+    // SAFETY: lanes of plain numbers need no instruction set.
+    unsafe { eliminate_lanes::<lanes::Scalar<8>>(a, width, own, is_positive) }
 }
 
 /// Right-looking elimination by panels: within a panel each row is changed by those before it alone, then all rows below take the whole panel off in one
-/// pass, so that each of them is read and written once for [`PANEL`] rows of `U`.
+/// pass, [`ROWS`] at a time. Each entry takes the rows of `U` off one after another, so that its bits depend on nothing but whether products are fused.
 #[inline(always)]
-fn eliminate_plain(a: &mut [f32], width: usize, own: usize, is_positive: &mut bool) {
+unsafe fn eliminate_lanes<V: DenseLanes>(
+    a: &mut [f32],
+    width: usize,
+    own: usize,
+    is_positive: &mut bool,
+) {
+    assert!(own <= width && a.len() == width * width, "a front");
+    let a = a.as_mut_ptr();
     let mut first = 0;
     while first < own {
         let end = (first + PANEL).min(own);
-        for k in first..end {
-            let (above, rows) = a.split_at_mut(k * width);
-            // Row `k` from its diagonal on: what is left of it is not read.
-            let row = &mut rows[k..width];
-            for earlier in first..k {
-                let earlier = &above[earlier * width + k..(earlier + 1) * width];
-                subtract(row, earlier, earlier[0]);
-            }
-            let pivot = row[0];
-            // A pivot that is not positive: the matrix is not positive definite and has no factor.
-            *is_positive &= pivot > 0.0 && pivot.is_finite();
-            if !*is_positive {
-                return;
-            }
-            // `U_kk = sqrt(pivot)`; its inverse stands on the diagonal, for the solves divide by it far more often than it is made.
-            let inverse = 1.0 / pivot.sqrt();
-            row[0] = inverse;
-            for value in &mut row[1..] {
-                *value *= inverse;
-            }
-        }
-        let (panel, rest) = a.split_at_mut(end * width);
-        let panel = &panel[first * width..];
-        for (i, row) in rest.chunks_exact_mut(width).enumerate() {
-            let i = end + i;
-            let row = &mut row[i..];
-            // The last panel may be narrower: it takes the loop of any length.
-            if end - first == PANEL {
-                let lines: [&[f32]; PANEL] =
-                    std::array::from_fn(|k| &panel[k * width + i..(k + 1) * width]);
-                subtract_panel(row, lines);
-            } else {
-                for line in panel.chunks_exact(width) {
-                    subtract(row, &line[i..], line[i]);
+        // SAFETY: rows and columns lie below `width`.
+        unsafe {
+            for k in first..end {
+                let row = a.add(k * width);
+                for earlier in first..k {
+                    take_off::<V, 1, 1>(a, width, earlier..earlier + 1, k, k);
                 }
+                let pivot = *row.add(k);
+                // A pivot that is not positive: the matrix is not positive definite and has no factor.
+                *is_positive &= pivot > 0.0 && pivot.is_finite();
+                if !*is_positive {
+                    return;
+                }
+                // `U_kk = sqrt(pivot)`; its inverse stands on the diagonal, for the solves divide by it far more often than it is made.
+                let inverse = 1.0 / pivot.sqrt();
+                *row.add(k) = inverse;
+                for column in k + 1..width {
+                    *row.add(column) *= inverse;
+                }
+            }
+            let mut row = end;
+            while row + ROWS <= width {
+                take_off::<V, ROWS, REGISTERS>(a, width, first..end, row, row);
+                row += ROWS;
+            }
+            while row < width {
+                take_off::<V, 1, REGISTERS>(a, width, first..end, row, row);
+                row += 1;
             }
         }
         first = end;
+    }
+}
+
+/// `a_ij -= sum_k u_ki u_kj` over the rows `panel` of `U`, for the rows `i` from `row` on and the columns `j` from `column` on; `R` rows at once.
+///
+/// # Safety
+/// That of the lanes; the rows and columns lie in `a [width, width]`, and the panel above the rows.
+#[inline(always)]
+unsafe fn take_off<V: DenseLanes, const R: usize, const N: usize>(
+    a: *mut f32,
+    width: usize,
+    panel: std::ops::Range<usize>,
+    row: usize,
+    column: usize,
+) {
+    // SAFETY: the caller's.
+    unsafe {
+        let mut at = column;
+        while at + N * V::COUNT <= width {
+            let own = |i: usize, n: usize| a.add((row + i) * width + at + n * V::COUNT);
+            let mut sums: [[V; N]; R] =
+                std::array::from_fn(|i| std::array::from_fn(|n| V::load(own(i, n))));
+            for k in panel.clone() {
+                let line = a.add(k * width);
+                let values: [V; N] = std::array::from_fn(|n| V::load(line.add(at + n * V::COUNT)));
+                for (i, sums) in sums.iter_mut().enumerate() {
+                    let factor = V::splat(*line.add(row + i));
+                    for (sum, value) in sums.iter_mut().zip(values) {
+                        *sum = value.neg_mul_add(factor, *sum);
+                    }
+                }
+            }
+            for (i, sums) in sums.into_iter().enumerate() {
+                for (n, sum) in sums.into_iter().enumerate() {
+                    sum.store(own(i, n));
+                }
+            }
+            at += N * V::COUNT;
+        }
+        while at < width {
+            let count = V::COUNT.min(width - at);
+            let own = |i: usize| a.add((row + i) * width + at);
+            let mut sums: [V; R] = std::array::from_fn(|i| load_some::<V>(own(i), count));
+            for k in panel.clone() {
+                let line = a.add(k * width);
+                let value = load_some::<V>(line.add(at), count);
+                for (i, sum) in sums.iter_mut().enumerate() {
+                    *sum = value.neg_mul_add(V::splat(*line.add(row + i)), *sum);
+                }
+            }
+            for (i, sum) in sums.into_iter().enumerate() {
+                store_some(sum, own(i), count);
+            }
+            at += count;
+        }
     }
 }
 
@@ -71,21 +129,6 @@ fn eliminate_plain(a: &mut [f32], width: usize, own: usize, is_positive: &mut bo
 fn subtract(row: &mut [f32], line: &[f32], factor: f32) {
     for (value, line) in row.iter_mut().zip(line) {
         *value -= factor * line;
-    }
-}
-
-/// Takes off a row what a whole panel has of it: one load and one store for [`PANEL`] products. `lines` begin at the row's own column.
-#[inline(always)]
-fn subtract_panel(row: &mut [f32], lines: [&[f32]; PANEL]) {
-    let len = row.len();
-    let lines = lines.map(|line| &line[..len]);
-    let factors = lines.map(|line| line[0]);
-    for j in 0..len {
-        let mut sum = row[j];
-        for k in 0..PANEL {
-            sum -= factors[k] * lines[k][j];
-        }
-        row[j] = sum;
     }
 }
 

@@ -79,8 +79,10 @@ struct Room {
 }
 
 impl Room {
-    /// For a matrix of `rows`, whose widest front has `widest`.
-    fn fit(&mut self, rows: usize, widest: usize) -> Result<()> {
+    /// For a matrix of `rows`, whose widest front has `widest`, of whose fronts `most_waiting` values wait at once.
+    fn fit(&mut self, rows: usize, widest: usize, most_waiting: usize) -> Result<()> {
+        self.waiting.clear();
+        memory::fit(&mut self.waiting, most_waiting, WHAT)?;
         self.front.clear();
         memory::fit(&mut self.front, widest * widest, WHAT)?;
         self.front.resize(widest * widest, 0.0);
@@ -146,7 +148,23 @@ impl SparseFactor {
             widest = widest.max(width);
         }
         refill(&mut self.upper, std::iter::repeat_n(0.0, size))?;
-        self.room.fit(3 * count, widest)
+        self.room.fit(3 * count, widest, self.most_waiting())
+    }
+
+    /// How many values wait for their parents at once, at most.
+    fn most_waiting(&self) -> usize {
+        let left = |front: &Front| 9 * (front.border_count as usize).pow(2);
+        let (mut waiting, mut most) = (0, 0);
+        for (at, front) in self.fronts.iter().enumerate() {
+            let mut child = at;
+            for _ in 0..front.children {
+                child = self.child_before(child, at);
+                waiting -= left(&self.fronts[child]);
+            }
+            waiting += left(front);
+            most = most.max(waiting);
+        }
+        most
     }
 
     /// The border of each front: what its own nodes and its children's borders are coupled with.
@@ -198,22 +216,19 @@ impl SparseFactor {
 
     /// Takes the values of a matrix with the planned pattern; returns whether it is positive definite. There is no factor
     /// where it is not.
-    ///
-    /// # Errors
-    /// [`field::Error::OutOfMemory`].
-    pub fn factor(&mut self, isa: Isa, matrix: &BlockRows) -> Result<bool> {
+    pub fn factor(&mut self, isa: Isa, matrix: &BlockRows) -> bool {
         self.is_made = false;
         self.room.waiting.clear();
         for at in 0..self.fronts.len() {
-            if !self.eliminate(isa, matrix, at)? {
-                return Ok(false);
+            if !self.eliminate(isa, matrix, at) {
+                return false;
             }
         }
         self.is_made = true;
-        Ok(true)
+        true
     }
 
-    fn eliminate(&mut self, isa: Isa, matrix: &BlockRows, at: usize) -> Result<bool> {
+    fn eliminate(&mut self, isa: Isa, matrix: &BlockRows, at: usize) -> bool {
         let front = &self.fronts[at];
         let (own, border) = (front.own as usize, front.border as usize);
         let rest = front.border_count as usize;
@@ -226,7 +241,7 @@ impl SparseFactor {
             self.room.local[place as usize] = (own + index) as u32;
         }
         if width == 0 {
-            return Ok(true);
+            return true;
         }
         let dense = &mut self.room.front[..width * width];
         dense.fill(0.0);
@@ -277,11 +292,10 @@ impl SparseFactor {
         eliminate(isa, dense, width, 3 * own, &mut is_positive);
         let upper = &mut self.upper[front.upper..][..3 * own * width];
         upper.copy_from_slice(&dense[..3 * own * width]);
-        memory::reserve(&mut self.room.waiting, 9 * rest * rest, WHAT)?;
         for row in dense[3 * own * width..].chunks_exact(width) {
             self.room.waiting.extend_from_slice(&row[3 * own..]);
         }
-        Ok(is_positive)
+        is_positive
     }
 
     /// `x = A^-1 b` in place, `[3 rows]`.

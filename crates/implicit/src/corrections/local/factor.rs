@@ -193,7 +193,7 @@ impl NearFactor {
         self.generation = *last;
         for (is_at_rest, more) in ATTEMPTS {
             self.assemble((env, near, far), at, (is_at_rest, more));
-            if self.factor.factor(env.isa, &self.rows)? {
+            if self.factor.factor(env.isa, &self.rows) {
                 self.made.take(at);
                 return Ok(());
             }
