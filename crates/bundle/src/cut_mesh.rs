@@ -2,7 +2,7 @@
 
 use topology::{Body, Changes, Skin};
 
-use super::mesh::{Bounds, Mesh, Opened, unique};
+use super::mesh::{Bounds, Mesh, Opened, unique, unique_below};
 use super::node_set::NodeSet;
 use field::error::Result;
 use field::memory;
@@ -66,6 +66,7 @@ impl Mesh {
         let domain_faces = memory::copied(touchable.faces.as_flattened(), WHAT)?;
         let most = domain_faces.len() + 4 * touchable.corners.len();
         let domain_nodes = memory::collected(most, touchable.nodes(), WHAT)?;
+        let domain_nodes = unique_below(count, &domain_nodes)?;
         let mut left = memory::room(4 * new.len(), WHAT)?;
         left.extend(new.iter().flat_map(|element| element.nodes));
         let left = unique(left);
@@ -98,7 +99,7 @@ impl Mesh {
             region,
             laws: memory::collected(self.laws.len(), self.laws.iter().cloned(), WHAT)?,
             surface_faces: memory::copied(&self.surface_faces, WHAT)?,
-            domain_nodes: unique(domain_nodes),
+            domain_nodes,
             domain_faces,
             surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
             held_nodes: unique(held_nodes),
@@ -136,7 +137,7 @@ impl Mesh {
             pieces,
         } = body.bounds(border, skin)?;
         Ok(Bounds {
-            nodes: unique(memory::copied(faces.as_flattened(), WHAT)?),
+            nodes: unique_below(body.node_count(), faces.as_flattened())?,
             faces,
             corners,
             pieces,

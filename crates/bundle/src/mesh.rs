@@ -307,6 +307,21 @@ pub(super) fn unique(mut nodes: Vec<u32>) -> Vec<u32> {
     nodes
 }
 
+/// Ascending and each once, of nodes below `count`: without sorting them, where they are many.
+pub(super) fn unique_below(count: usize, nodes: &[u32]) -> Result<Vec<u32>> {
+    let mut is_there = memory::filled(count, false, WHAT)?;
+    for &node in nodes {
+        is_there[node as usize] = true;
+    }
+    let mut found = memory::room(nodes.len().min(count), WHAT)?;
+    found.extend(
+        (0u32..)
+            .zip(&is_there)
+            .filter_map(|(node, is)| is.then_some(node)),
+    );
+    Ok(found)
+}
+
 fn at(positions: &[f32], node: u32) -> [f64; 3] {
     let i = 3 * node as usize;
     [

@@ -3,7 +3,7 @@
 use crate::cluster::{Cluster, Group, corners};
 use crate::gradients::Gradients;
 use crate::material::Material;
-use crate::room::{collected, push, room};
+use crate::room::{collected, grow, push, room};
 use crate::tetrahedra::Tetrahedra;
 use crate::vector::{cross, dot};
 use lanes::WIDTH;
@@ -57,10 +57,10 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
     ) -> Result<Range<usize>, TryReserveError> {
         let start = self.batches.len();
         let (groups, ends) = disjoint_batches(groups)?;
-        self.batches.try_reserve(ends.len())?;
-        self.elements.try_reserve(ends.len())?;
+        grow(&mut self.batches, ends.len())?;
+        grow(&mut self.elements, ends.len())?;
         if source.gradients {
-            self.gradients.try_reserve(ends.len())?;
+            grow(&mut self.gradients, ends.len())?;
         }
         let starts = std::iter::once(0).chain(ends.iter().copied());
         for (first, end) in starts.zip(&ends) {

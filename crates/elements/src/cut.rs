@@ -9,7 +9,7 @@ use crate::internal_forces::ElementForces;
 use crate::material::Material;
 use crate::partition::{CHUNK_ELEMENTS, Chunk, Partition};
 use crate::regions::Laws;
-use crate::room::{collected, filled, push, room};
+use crate::room::{collected, copied_with_room, filled, push, room};
 use crate::tetrahedra::Tetrahedra;
 use lanes::WIDTH;
 use std::collections::TryReserveError;
@@ -46,10 +46,7 @@ impl ElementForces {
         cut: CutTetrahedra<'_>,
         material: &Material,
     ) -> Result<Self, TryReserveError> {
-        let mut partition = self.partition.copied()?;
-        let more = cut.positions.len() - partition.slot_of_node.len();
-        partition.slot_of_node.try_reserve_exact(more)?;
-        partition.slot_of_node.resize(cut.positions.len(), PADDING);
+        let mut partition = self.partition.copied(cut.positions.len())?;
         let mut is_changed = filled(cut.tets.len(), false)?;
         for &element in cut.changed {
             is_changed[element as usize] = true;
@@ -113,8 +110,8 @@ impl ElementForces {
 }
 
 impl Partition {
-    /// A copy.
-    fn copied(&self) -> Result<Partition, TryReserveError> {
+    /// A copy, for a body of so many nodes.
+    fn copied(&self, nodes: usize) -> Result<Partition, TryReserveError> {
         let mut chunks = room(self.chunks.len() + 8)?;
         for chunk in &self.chunks {
             chunks.push(Chunk {
@@ -133,9 +130,11 @@ impl Partition {
         copy.octahedra = self.octahedra.copied()?;
         copy.pairs = self.pairs.copied()?;
         copy.singles = self.singles.copied()?;
-        copy.node_of_slot = collected(self.node_of_slot.iter().copied())?;
-        copy.slot_of_node = collected(self.slot_of_node.iter().copied())?;
-        copy.rest = collected(self.rest.iter().copied())?;
+        copy.node_of_slot = copied_with_room(&self.node_of_slot)?;
+        copy.slot_of_node = room(nodes)?;
+        copy.slot_of_node.extend_from_slice(&self.slot_of_node);
+        copy.slot_of_node.resize(nodes, PADDING);
+        copy.rest = copied_with_room(&self.rest)?;
         Ok(copy)
     }
 
@@ -179,9 +178,9 @@ impl Partition {
 impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
     fn copied(&self) -> Result<Self, TryReserveError> {
         Ok(Kind {
-            batches: collected(self.batches.iter().copied())?,
-            gradients: collected(self.gradients.iter().copied())?,
-            elements: collected(self.elements.iter().copied())?,
+            batches: copied_with_room(&self.batches)?,
+            gradients: copied_with_room(&self.gradients)?,
+            elements: copied_with_room(&self.elements)?,
         })
     }
 

@@ -14,7 +14,7 @@ use crate::gradients::Gradients;
 use crate::laws::Law;
 use crate::material::{Material, Moduli};
 use crate::relaxation::Relaxation;
-use crate::room::{collected, filled, room};
+use crate::room::{collected, filled, grow, room};
 use crate::slots::PADDED;
 use crate::tetrahedra::Tetrahedra;
 use crate::tetrahedron::Tetrahedron;
@@ -244,8 +244,8 @@ impl Partition {
         own.extend(nodes.iter().filter(owned));
         ghost.extend(nodes.iter().filter(|node| !owned(node)));
         let padded = (first + nodes.len()).next_multiple_of(4);
-        self.node_of_slot.try_reserve(padded - first)?;
-        self.rest.try_reserve(padded - first)?;
+        grow(&mut self.node_of_slot, padded - first)?;
+        grow(&mut self.rest, padded - first)?;
         for (offset, node) in own.iter().enumerate() {
             self.slot_of_node[*node as usize] = (first + offset) as u32;
         }

@@ -23,6 +23,21 @@ pub fn collected<T>(values: impl ExactSizeIterator<Item = T>) -> Result<Vec<T>, 
     Ok(list)
 }
 
+/// A copy of a long list that a few values will be added to.
+pub fn copied_with_room<T: Copy>(values: &[T]) -> Result<Vec<T>, TryReserveError> {
+    let mut list = room(values.len() + values.len() / 16 + 8)?;
+    list.extend_from_slice(values);
+    Ok(list)
+}
+
+/// Room for `more` elements of a long list: where there is none it grows by a quarter, for twice as much would lie idle.
+pub fn grow<T>(list: &mut Vec<T>, more: usize) -> Result<(), TryReserveError> {
+    if list.capacity() - list.len() < more {
+        list.try_reserve_exact(more.max(list.len() / 4))?;
+    }
+    Ok(())
+}
+
 /// One more element.
 pub fn push<T>(list: &mut Vec<T>, value: T) -> Result<(), TryReserveError> {
     list.try_reserve(1)?;

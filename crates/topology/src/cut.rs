@@ -12,7 +12,7 @@ use crate::polygon::middle;
 use crate::polytope::{Polytope, Side, Weights};
 use crate::push::Opened;
 use crate::rest::{length, minus};
-use crate::room::push;
+use crate::room::{push, room};
 use crate::{Point, Sweep, TopologyError};
 
 /// A node nearer to the blade than this part of the edges around it is put onto it.
@@ -138,14 +138,28 @@ impl Body {
                 is_below && corners.iter().any(|at| at[k] >= low[k] - more)
             })
         };
-        // Cheaper, and true of all of these and some others: no edge is longer than the box of its element is wide in all.
+        // Cheaper, and true of all of these and some others: no edge is longer than the box of its element is wide in all, and what f32 rounds off is less
+        // than a thousandth of that, or of a millimetre, in a body of metres.
+        let mut rounded = room(positions.len())?;
+        rounded.extend(
+            positions
+                .iter()
+                .map(|at| [at[0] as f32, at[1] as f32, at[2] as f32, 0.0]),
+        );
+        let [least_of_sweep, most_of_sweep] =
+            [low, high].map(|at| [at[0] as f32, at[1] as f32, at[2] as f32, 0.0]);
         let may_meet = |nodes: [u32; 4]| {
-            let [a, b, c, d] = nodes.map(|node| positions[node as usize]);
-            let least = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k]).min(d[k]));
-            let most = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k]).max(d[k]));
-            let wide: f64 = (0..3).map(|k| most[k] - least[k]).sum();
-            let more = 2.0 * SNAP * wide;
-            (0..3).all(|k| least[k] <= high[k] + more && most[k] >= low[k] - more)
+            let [a, b, c, d] = nodes.map(|node| rounded[node as usize]);
+            let least = lower(lower(a, b), lower(c, d));
+            let most = higher(higher(a, b), higher(c, d));
+            let wide: [f32; 4] = std::array::from_fn(|k| most[k] - least[k]);
+            let more = (2.0 * SNAP as f32 + 1e-3) * (wide[0] + wide[1] + wide[2]) + 1e-3;
+            // How far it lies outside: of all elements but a few more than its margin.
+            let outside: [f32; 4] = std::array::from_fn(|k| {
+                let (over, under) = (least[k] - most_of_sweep[k], least_of_sweep[k] - most[k]);
+                if over > under { over } else { under }
+            });
+            (outside[0] <= more) & (outside[1] <= more) & (outside[2] <= more)
         };
         let mut near = Vec::new();
         let mut cut = self.cells.iter().peekable();
@@ -284,6 +298,16 @@ fn face_on_plane(material: &Polytope, distance: &Weights) -> Option<Vec<Weights>
     let mut faces = material.faces.iter();
     let found = faces.find(|(_, points)| lies(points));
     found.map(|(_, points)| points.clone())
+}
+
+/// The smaller of each pair of numbers; comparisons alone, which compile to one instruction for all four.
+fn lower(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    std::array::from_fn(|k| if a[k] < b[k] { a[k] } else { b[k] })
+}
+
+/// The larger, likewise.
+fn higher(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    std::array::from_fn(|k| if a[k] > b[k] { a[k] } else { b[k] })
 }
 
 fn longest(corners: &[Point; 4]) -> f64 {

@@ -13,10 +13,12 @@ use crate::memory::{self, HeldBytes};
 /// Room for the pairs of the last published state and for those of the step being made: a step that is refused leaves no trace.
 pub(super) const SLOTS: usize = 2 * PAIRS;
 
+const WHAT: &str = "L-BFGS pairs";
+
 /// The pairs, oldest first by `order`.
 #[derive(HeldBytes)]
 pub struct Memory {
-    /// `s` `[K,3]`, mm, and `y`, µN, by slot.
+    /// `s` `[K,3]`, mm, and `y`, µN, by slot; none until a pair is stored: steps that tools drive store none here.
     steps: Vec<Vec<f32>>,
     changes: Vec<Vec<f32>>,
     /// Slots from the oldest to the newest.
@@ -37,18 +39,13 @@ impl Memory {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn new(len: usize) -> Result<Memory> {
-        let vectors = |len: usize| -> Result<Vec<Vec<f32>>> {
-            (0..SLOTS)
-                .map(|_| memory::zeros(len, "L-BFGS pairs"))
-                .collect()
-        };
         Ok(Memory {
-            steps: vectors(len)?,
-            changes: vectors(len)?,
-            order: memory::room(SLOTS, "L-BFGS pairs")?,
-            published: memory::room(SLOTS, "L-BFGS pairs")?,
-            products: memory::filled(SLOTS, [0.0; SLOTS], "L-BFGS pairs")?,
-            masked: memory::filled(SLOTS, [0.0; SLOTS], "L-BFGS pairs")?,
+            steps: memory::room(SLOTS, WHAT)?,
+            changes: memory::room(SLOTS, WHAT)?,
+            order: memory::room(SLOTS, WHAT)?,
+            published: memory::room(SLOTS, WHAT)?,
+            products: memory::filled(SLOTS, [0.0; SLOTS], WHAT)?,
+            masked: memory::filled(SLOTS, [0.0; SLOTS], WHAT)?,
             partial: PartialSums::with_room(len, PAIRS)?,
         })
     }
@@ -101,6 +98,7 @@ impl Memory {
 
     /// Stores `s = t d` and `y` (both zero at masked nodes) in place of the oldest pair, if it has curvature; tells whether it has.
     pub fn store(&mut self, env: Env<'_>, d: &[f32], t: f32, y: &[f32]) -> Result<bool> {
+        self.fit(d.len())?;
         if self.order.len() == PAIRS {
             self.order.remove(0);
         }
@@ -114,6 +112,16 @@ impl Memory {
         self.order.push(slot);
         self.fill_products(env, slot)?;
         Ok(self.order.last() == Some(&slot))
+    }
+
+    /// Room for all pairs of vectors of `len`.
+    fn fit(&mut self, len: usize) -> Result<()> {
+        for vectors in [&mut self.steps, &mut self.changes] {
+            while vectors.len() < SLOTS {
+                vectors.push(memory::zeros(len, WHAT)?);
+            }
+        }
+        Ok(())
     }
 
     fn fill_products(&mut self, env: Env<'_>, slot: usize) -> Result<()> {

@@ -15,7 +15,10 @@ pub(super) fn nearest_squared(rest: &[f32], nodes: &[u32], node: u32) -> f32 {
         let apart = own.iter().zip(at(other)).map(|(a, b)| (a - b) * (a - b));
         apart.sum::<f32>()
     });
-    squares.fold(f32::MAX, f32::min)
+    squares.fold(
+        f32::MAX,
+        |least, square| if square < least { square } else { least },
+    )
 }
 
 /// Whether one of some nodes lies within a distance of a node at rest.

@@ -44,9 +44,9 @@ impl LinearElements {
             shear: (moduli.shear_pa * element.volume) as f32,
             lambda: (lambda * element.volume) as f32,
         };
-        // A large list, of a scene's own: its room grows by an eighth.
+        // A large list, of a scene's own: its room grows by an eighth, once it has some thousands.
         if self.0.len() == self.0.capacity() {
-            let more = (self.0.len() / 8).max(256);
+            let more = (self.0.len() / 8).max(4096);
             memory::reserve(&mut self.0, more, WHAT)?;
         }
         self.0.push(linear);
@@ -222,7 +222,8 @@ impl Parts {
                         self.summed[place as usize / 64] |= 1 << (place % 64);
                         for (sum, value) in sum.iter_mut().zip(gradient) {
                             *sum += share * value;
-                            largest = largest.max((share * value).abs());
+                            let size = (share * value).abs();
+                            largest = if size > largest { size } else { largest };
                         }
                     }
                 }
