@@ -131,6 +131,15 @@ pub struct Scaled {
     pub shear_pa: f64,
 }
 
+impl From<Ogden> for Scaled {
+    fn from(terms: Ogden) -> Self {
+        Self {
+            law: Law::Ogden(terms),
+            shear_pa: terms.shear_pa(),
+        }
+    }
+}
+
 impl Scaled {
     /// `P` and `cof F` of a deformation that keeps the volume.
     fn stress(&self, f: [[f64; 3]; 3]) -> [[[f64; 3]; 3]; 2] {

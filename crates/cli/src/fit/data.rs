@@ -4,6 +4,7 @@
 //! stretch is 1 at rest, the amount of shear 0); `nominal_stress_pa` or `nominal_stress_kpa` (force over the area at rest, negative
 //! under compression); and if a file holds several specimens, their name in `sample`, `region` or `phantom`.
 
+use std::ops::Index;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -11,7 +12,7 @@ use anyhow::{Context, Result, bail};
 use super::curve::{Curve, Mode};
 
 /// Names of the column of specimens.
-const SAMPLES: [&str; 3] = ["sample", "region", "phantom"];
+pub const SAMPLES: [&str; 3] = ["sample", "region", "phantom"];
 /// Names of the column of stretches and shears.
 const STRETCHES: [&str; 3] = ["stretch", "stretch_or_shear", "shear"];
 /// Names of the column of stresses, with their unit in Pa.
@@ -29,10 +30,25 @@ pub struct Sample {
     pub curves: Vec<Curve>,
 }
 
+/// A line of a table.
+pub struct Row {
+    /// Its number in the file, from 1 on.
+    pub line: usize,
+    fields: Vec<String>,
+}
+
+impl Index<usize> for Row {
+    type Output = String;
+
+    fn index(&self, column: usize) -> &String {
+        &self.fields[column]
+    }
+}
+
 /// A table of text: its head and its rows.
 pub struct Table {
     head: Vec<String>,
-    rows: Vec<Vec<String>>,
+    rows: Vec<Row>,
     path: String,
 }
 
@@ -57,17 +73,16 @@ impl Table {
         let head = split(head.trim_start_matches('\u{feff}'));
         let mut rows = Vec::new();
         for (number, line) in lines {
-            let row = split(line);
-            if row.len() != head.len() {
+            let (line, fields) = (number + 1, split(line));
+            if fields.len() != head.len() {
                 bail!(
-                    "{}: line {} has {} fields where the head has {}",
+                    "{}: line {line} has {} fields where the head has {}",
                     path.display(),
-                    number + 1,
-                    row.len(),
+                    fields.len(),
                     head.len()
                 );
             }
-            rows.push(row);
+            rows.push(Row { line, fields });
         }
         Ok(Self {
             head,
@@ -89,20 +104,26 @@ impl Table {
         found.with_context(|| format!("{}: has no column {}", self.path, names.join(" or ")))
     }
 
-    pub fn rows(&self) -> &[Vec<String>] {
+    pub fn rows(&self) -> &[Row] {
         &self.rows
     }
 
     /// A number of a row.
-    pub fn number(&self, row: &[String], column: usize) -> Result<f64> {
-        let value: f64 = row[column].parse().with_context(|| {
-            format!("{}: {} is `{}`", self.path, self.head[column], row[column])
-        })?;
+    pub fn number(&self, row: &Row, column: usize) -> Result<f64> {
+        let (path, line, name) = (&self.path, row.line, &self.head[column]);
+        let value: f64 = (row[column].parse())
+            .with_context(|| format!("{path}: line {line}: {name} is `{}`", row[column]))?;
         if value.is_finite() {
             Ok(value)
         } else {
-            bail!("{}: {} is {value}", self.path, self.head[column])
+            bail!("{path}: line {line}: {name} is {value}")
         }
+    }
+
+    /// The unit of a column, by its name in a list.
+    pub fn unit<T: Copy>(&self, column: usize, units: &[(&str, T)]) -> Option<T> {
+        let own = units.iter().find(|(name, _)| self.head[column] == *name);
+        own.map(|(_, unit)| *unit)
     }
 }
 
@@ -112,10 +133,7 @@ pub fn read(path: &Path) -> Result<Vec<Sample>> {
     let mode = table.needed(&["mode"])?;
     let stretch = table.needed(&STRETCHES)?;
     let stress = table.needed(&STRESSES.map(|(name, _)| name))?;
-    let unit = STRESSES
-        .iter()
-        .find(|(name, _)| table.head[stress] == *name);
-    let unit = unit.map_or(1.0, |(_, unit)| *unit);
+    let unit = table.unit(stress, &STRESSES).unwrap_or(1.0);
     let sample = table.column(&SAMPLES);
     let mut samples: Vec<Sample> = Vec::new();
     for row in table.rows() {
@@ -194,7 +212,10 @@ mod tests {
             (head.to_owned(), "no rows"),
             (format!("{head}{rows}"), "at least 3"),
             (format!("{head}{rows}tension,1.2\n"), "line 4 has 2 fields"),
-            (format!("{head}{rows}tension,1.2,x\n"), "stress_pa is `x`"),
+            (
+                format!("{head}{rows}tension,1.2,x\n"),
+                "line 4: stress_pa is `x`",
+            ),
             (format!("{head}{rows}tension,1.2,inf\n"), "stress_pa is inf"),
             (format!("{head}{rows}bending,1.2,1\n"), "mode `bending`"),
             (format!("{head}{rows}tension,0,1\n"), "stretch of 0"),

@@ -5,8 +5,8 @@
 use anyhow::{Result, bail};
 use elements::{Law, VerondaWestmann, Yeoh};
 
-use super::curve::{Curve, Scaled};
-use super::least_squares::{self, Unknown};
+use super::curve::Scaled;
+use super::least_squares::{self, Test, Unknown};
 
 /// Exponents that are sought, and from where.
 const BETAS: [f64; 2] = [0.4, 1000.0];
@@ -46,9 +46,9 @@ impl Growing {
 }
 
 /// The best law of all starts.
-pub fn best(curves: &[Curve], which: Growing) -> Result<Scaled> {
-    let unit = least_squares::unit(curves);
-    let stiffness = || Unknown::between(1.0, [0.0, f64::INFINITY]);
+pub fn best(test: &(impl Test<Scaled> + ?Sized), which: Growing) -> Result<Scaled> {
+    let unit = test.unit();
+    let stiffness = Unknown::stiffness;
     let starts: Vec<Vec<Unknown>> = match which {
         Growing::Yeoh(count) => vec![(0..count).map(|_| stiffness()).collect()],
         Growing::VerondaWestmann => STARTS
@@ -56,7 +56,7 @@ pub fn best(curves: &[Curve], which: Growing) -> Result<Scaled> {
             .into(),
     };
     let constants =
-        least_squares::best(curves, starts, |constants| Some(which.law(constants, unit)))?;
+        least_squares::best(test, starts, |constants| Some(which.law(constants, unit)))?;
     match which.law(&constants, unit) {
         law if law.shear_pa > 1e-6 * unit => Ok(law),
         _ => bail!("no law fits: the shear modulus comes out as zero"),
@@ -104,7 +104,7 @@ mod tests {
         ] {
             let shear_pa = 640.0;
             let law = Scaled { law, shear_pa };
-            let found = best(&curves(&law), which).unwrap();
+            let found = best(&curves(&law)[..], which).unwrap();
             assert!((found.shear_pa / shear_pa - 1.0).abs() < 1e-3, "{found:?}");
             match found.law {
                 Law::Yeoh(found) => {

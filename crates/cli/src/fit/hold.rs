@@ -68,7 +68,7 @@ impl Hold {
         let table = Table::read(path)?;
         let time = table.needed(&["time_s"])?;
         let load = table.needed(&LOADS.map(|(name, _)| name))?;
-        let unit = (LOADS.iter()).find(|(name, _)| table.column(&[*name]) == Some(load));
+        let unit = table.unit(load, &LOADS).unwrap_or_default();
         let mut points: Vec<[f64; 2]> = Vec::new();
         for row in table.rows() {
             let [t, y] = [table.number(row, time)?, table.number(row, load)?];
@@ -83,7 +83,7 @@ impl Hold {
         let own = Self {
             points,
             ramp_s,
-            unit: unit.map_or("", |(_, unit)| *unit),
+            unit,
         };
         own.check(&path.display().to_string())?;
         Ok(own)

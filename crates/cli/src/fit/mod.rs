@@ -1,4 +1,5 @@
-//! `upt fit`: a law's constants from measured curves of tension, compression, shear and torsion, and Prony terms from a strain that is held.
+//! `upt fit`: a law's constants from measured curves of tension, compression, shear and torsion, or from a press of a cylinder, and Prony terms from a strain
+//! that is held.
 
 pub mod curve;
 pub mod data;
@@ -6,22 +7,25 @@ mod growing;
 mod hold;
 mod least_squares;
 pub mod plot;
+mod pressed;
+pub mod specimen;
 pub mod stretches;
+pub mod wanted;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::str::FromStr;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use elements::{Law, MOST_TERMS, MooneyRivlin, Ogden};
+use elements::Law;
 use serde_json::json;
 
 use curve::{Response, Scaled};
 use data::Sample;
-use growing::Growing;
 use hold::Hold;
-use stretches::Exponents;
+use pressed::Pressed;
+use specimen::{Cylinder, Press, Specimen};
+use wanted::Asked;
 
 #[derive(Args)]
 #[command(after_help = "Examples:
@@ -30,6 +34,8 @@ use stretches::Exponents;
   upt fit skin.csv --law veronda-westmann
   upt fit brain.csv --law ogden:1 --sample cortex
   upt fit brain.csv --law ogden:1 --exponents -18 --sample cortex --json
+  upt fit phantom.csv --law mooney-rivlin --specimen cylinder:25,30
+  upt fit liver.csv --law ogden:1 --specimen cylinder:20,15 --press ball:3 --plot liver.svg
   upt fit held.csv --relaxation 2 --ramp 0.3 --plot held.svg")]
 pub struct Options {
     /// CSV file with the columns mode (tension, compression, shear, torsion), stretch (shear: amount of shear; torsion: that of a cylinder's side),
@@ -57,6 +63,12 @@ pub struct Options {
         allow_hyphen_values = true
     )]
     exponents: Vec<f64>,
+    /// Body that was tested, where it is not deformed alike everywhere: cylinder:RADIUS,HEIGHT (mm), pressed along its axis. The columns are displacement_mm (from where the press first touched) and force_n or force_mn, both 0 or more. Fitted by equilibria of a mesh, at Poisson's ratio 0.49.
+    #[arg(long, value_name = "SHAPE", conflicts_with = "relaxation")]
+    specimen: Option<Cylinder>,
+    /// What presses the specimen: plate (both plates hold the ends, without slip) or ball:RADIUS (mm; no friction, the bottom is held).
+    #[arg(long, default_value = "plate", requires = "specimen")]
+    press: Press,
     /// Specimen to fit, where the file holds several.
     #[arg(long)]
     sample: Option<String>,
@@ -70,78 +82,6 @@ pub struct Options {
 
 /// Poisson's ratio of Young's modulus in the options that are printed: the default of `upt simulate` and `upt make`.
 const POISSON: f64 = 0.49;
-
-/// A law whose constants are not known yet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Asked {
-    Stretches(Wanted),
-    Grows(Growing),
-}
-
-/// One that is written in stretches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted {
-    NeoHookean,
-    MooneyRivlin,
-    Ogden(usize),
-}
-
-impl FromStr for Asked {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once(':') {
-            None if text == "neo-hookean" => Ok(Self::Stretches(Wanted::NeoHookean)),
-            None if text == "mooney-rivlin" => Ok(Self::Stretches(Wanted::MooneyRivlin)),
-            None if text == "ogden" => Ok(Self::Stretches(Wanted::Ogden(1))),
-            None if text == "yeoh" => Ok(Self::Grows(Growing::Yeoh(3))),
-            None if text == "veronda-westmann" => Ok(Self::Grows(Growing::VerondaWestmann)),
-            Some(("yeoh", constants)) => match constants.parse() {
-                Ok(count) if (2..=3).contains(&count) => Ok(Self::Grows(Growing::Yeoh(count))),
-                _ => Err(format!(
-                    "`{constants}` is not a number of constants, 2 or 3"
-                )),
-            },
-            Some(("ogden", terms)) => match terms.parse() {
-                Ok(count) if (1..=MOST_TERMS).contains(&count) => {
-                    Ok(Self::Stretches(Wanted::Ogden(count)))
-                }
-                _ => Err(format!(
-                    "`{terms}` is not a number of terms from 1 to {MOST_TERMS}"
-                )),
-            },
-            _ => Err(format!(
-                "law `{text}` is unknown: use ogden:TERMS, neo-hookean, mooney-rivlin, yeoh:2, yeoh:3 or veronda-westmann"
-            )),
-        }
-    }
-}
-
-impl Wanted {
-    /// Its exponents.
-    pub fn exponents(self) -> Exponents {
-        match self {
-            Self::NeoHookean => Exponents::Fixed(vec![2.0]),
-            Self::MooneyRivlin => Exponents::Fixed(vec![2.0, -2.0]),
-            Self::Ogden(count) => Exponents::Free(count),
-        }
-    }
-
-    /// The law that fitted terms are, as `--law` takes it.
-    fn law(self, terms: &Ogden) -> Law {
-        let part = |alpha: f64| -> f64 {
-            let terms = terms.terms.iter().filter(|term| term.alpha == alpha);
-            terms.map(|term| 0.5 * term.mu_pa * term.alpha).sum()
-        };
-        match self {
-            Self::MooneyRivlin => Law::MooneyRivlin(MooneyRivlin {
-                c01_share: part(-2.0) / terms.shear_pa(),
-            }),
-            Self::Ogden(_) => Law::Ogden(*terms),
-            Self::NeoHookean => Law::default(),
-        }
-    }
-}
 
 /// The specimen that was asked for.
 fn chosen(mut samples: Vec<Sample>, asked: Option<&str>) -> Result<Sample> {
@@ -193,36 +133,62 @@ fn run_hold(options: &Options, branches: usize) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// `--specimen`.
+fn run_press(options: &Options, cylinder: Cylinder) -> Result<ExitCode> {
+    let specimen = Specimen {
+        cylinder,
+        press: options.press,
+    };
+    let test = Pressed::read(&options.data, specimen, options.sample.as_deref())?;
+    let found = (options.law.fit(&test, &options.exponents))
+        .with_context(|| format!("{}: cannot be fitted", options.data.display()))?;
+    let Scaled { law, shear_pa } = found.scaled;
+    refuse(options, law)?;
+    let written = as_option(law, shear_pa);
+    let r2 = (test.r2(found.scaled)).context("the law that was found has no equilibrium")?;
+    if let Some(path) = &options.plot {
+        let line = |x: f64| test.force(found.scaled, x).unwrap_or(f64::NAN);
+        std::fs::write(path, plot::draw_press(&test.points, line))
+            .with_context(|| format!("{}: cannot be written", path.display()))?;
+    }
+    if options.json {
+        let value = json!({"sample": test.name, "law": law, "law_option": written, "shear_modulus_pa": shear_pa, "poisson": POISSON, "r2": {"press": r2}, "mesh_error": test.mesh_error()});
+        println!("{}", serde_json::to_string_pretty(&value)?);
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("--law {written}");
+    println!("shear modulus at rest {shear_pa:.1} Pa; Poisson's ratio {POISSON}");
+    println!(
+        "press        R² {r2:.3}  ({} points, displacement 0 to {} mm)",
+        test.points.len(),
+        test.most()
+    );
+    println!(
+        "cylinder of radius {} mm and height {} mm under {}; the mesh alone is {:.1} % off, which is taken off; beyond these displacements the law extrapolates",
+        cylinder.radius,
+        cylinder.height,
+        specimen.press,
+        100.0 * test.mesh_error()
+    );
+    if let Some(path) = &options.plot {
+        println!("plot: {}", path.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
 pub fn run(options: &Options) -> Result<ExitCode> {
     if let Some(branches) = options.relaxation {
         return run_hold(options, branches);
     }
+    if let Some(cylinder) = options.specimen {
+        return run_press(options, cylinder);
+    }
     let sample = chosen(data::read(&options.data)?, options.sample.as_deref())?;
-    let wanted = match options.law {
-        Asked::Stretches(wanted) => wanted,
-        Asked::Grows(_) if !options.exponents.is_empty() => {
-            bail!("--exponents goes with --law ogden:TERMS")
-        }
-        Asked::Grows(which) => {
-            let found = growing::best(&sample.curves, which)?;
-            return report(options, &sample, &found, found);
-        }
-    };
-    let exponents = match (&options.exponents[..], wanted) {
-        ([], wanted) => wanted.exponents(),
-        (list, Wanted::Ogden(count)) if list.len() == count => Exponents::Fixed(list.to_vec()),
-        (list, Wanted::Ogden(count)) => bail!(
-            "--exponents has {} numbers, and ogden:{count} has {count} terms",
-            list.len()
-        ),
-        _ => bail!("--exponents goes with --law ogden:TERMS"),
-    };
-    let terms = stretches::best(&sample.curves, &exponents)?;
-    let found = Scaled {
-        law: wanted.law(&terms),
-        shear_pa: terms.shear_pa(),
-    };
-    report(options, &sample, &terms, found)
+    let found = options.law.fit(&sample.curves[..], &options.exponents)?;
+    match found.terms {
+        Some(terms) => report(options, &sample, &terms, found.scaled),
+        None => report(options, &sample, &found.scaled, found.scaled),
+    }
 }
 
 /// A fitted law as `--law` takes it.
@@ -242,6 +208,17 @@ fn as_option(law: Law, shear_pa: f64) -> String {
     }
 }
 
+/// What `upt simulate` would refuse is said here.
+fn refuse(options: &Options, law: Law) -> Result<()> {
+    match format!("{law}").parse::<Law>() {
+        Ok(_) => Ok(()),
+        Err(error) => bail!(
+            "{}: the fitted law is not one that solvers take: {error}",
+            options.data.display()
+        ),
+    }
+}
+
 /// What a fit has found; `response` is the law at its stiffness.
 fn report(
     options: &Options,
@@ -250,13 +227,7 @@ fn report(
     found: Scaled,
 ) -> Result<ExitCode> {
     let Scaled { law, shear_pa } = found;
-    // What `upt simulate` would refuse is said here.
-    if let Err(error) = format!("{law}").parse::<Law>() {
-        bail!(
-            "{}: the fitted law is not one that solvers take: {error}",
-            options.data.display()
-        );
-    }
+    refuse(options, law)?;
     let written = as_option(law, shear_pa);
     if let Some(path) = &options.plot {
         std::fs::write(path, plot::draw(&sample.curves, &[(&written, response)]))

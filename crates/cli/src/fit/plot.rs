@@ -96,3 +96,28 @@ pub fn draw_hold(hold: &Hold, terms: &Terms) -> String {
     }
     axes.standalone(&[("measured", colour(0)), ("fitted", colour(1))])
 }
+
+/// An SVG file of a press: force in mN by displacement in mm, discs measured, a line fitted.
+pub fn draw_press(points: &[[f64; 2]], force: impl Fn(f64) -> f64) -> String {
+    let most = points.iter().fold(0.0f64, |most, [x, _]| most.max(*x));
+    let line: Vec<(f64, f64)> = (0..=STEPS)
+        .map(|k| most * k as f64 / STEPS as f64)
+        .map(|x| (x, force(x)))
+        .collect();
+    let values = points.iter().map(|[_, y]| *y);
+    let values = values.chain(line.iter().map(|(_, y)| *y));
+    let [low, high] = values.fold([0.0f64, 0.0], |[low, high], y| [low.min(y), high.max(y)]);
+    let mut axes = Axes::new(
+        760.0,
+        440.0,
+        Scale::linear(0.0, most),
+        Scale::linear(low, high),
+        "displacement, mm",
+        "force, mN",
+    );
+    axes.line(&line, colour(1), 2.0, false);
+    for [x, y] in points {
+        axes.disc(*x, *y, 3.0, colour(0), true, &format!("{x} mm: {y:.1} mN"));
+    }
+    axes.standalone(&[("measured", colour(0)), ("fitted", colour(1))])
+}

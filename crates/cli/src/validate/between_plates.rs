@@ -10,24 +10,19 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use elements::{Law, Material, MooneyRivlin, Ogden};
 use gauge::median;
-use tissue::axisymmetric::{Axis, Equilibrium, Obstacle, Section as Plane, Shape};
 
 use super::section::{Section, verdict};
 use super::silicone::{BAR, PREDICTED, Phantom, RADIUS_MM, beyond, read};
 use crate::fit::curve::{Mode, nominal_stress};
+use crate::fit::specimen::{SHEAR_PA, held, limit};
 
 /// Half the height of the cylinders, mm.
 const HALF_MM: f64 = 15.0;
 /// Cells across and along of half a cylinder, the second twice the first, smaller towards the edge of the plate.
 const CELLS: [[usize; 2]; 2] = [[10, 6], [20, 12]];
-const GRADING: f64 = 1.5;
 /// Strains that are solved, to 40 %.
 const STEPS: usize = 16;
 const MOST: f64 = 0.4;
-/// Shear modulus of the equilibria, Pa.
-const SHEAR_PA: f64 = 1000.0;
-/// What the plate presses the side with, over the shear modulus, 1/mm.
-const STIFFNESS: f64 = 50.0;
 /// Constants that are tried in a fit, between each two that are solved.
 const TRIED: usize = 10;
 
@@ -82,48 +77,6 @@ impl Family {
     }
 }
 
-/// Lines of a length, close to each other at its end.
-fn lines(count: usize, length: f64) -> Vec<f64> {
-    let part = |k: usize| 1.0 - (1.0 - k as f64 / count as f64).powf(GRADING);
-    (0..=count).map(|k| length * part(k)).collect()
-}
-
-/// Force of a cylinder between plates that hold its ends by strain, mN, at `most k / steps`, from 1 on.
-pub fn held(
-    [radius, half]: [f64; 2],
-    material: &Material,
-    most: f64,
-    steps: usize,
-    [across, along]: [usize; 2],
-) -> Result<Vec<f64>> {
-    let plane = Plane::grid(&lines(across, radius), &lines(along, half));
-    let (middle, plate, side) = (plane.level(0), plane.level(along), plane.side(across));
-    let mut body = Equilibrium::new(plane, material);
-    body.hold(&middle, Axis::Along, 0.0);
-    body.hold(&plate, Axis::Across, 0.0);
-    body.hold(&plate, Axis::Along, -most * half);
-    let obstacle = Obstacle {
-        shape: Shape::Plate,
-        low: half,
-        motion: -most * half,
-        stiffness: STIFFNESS * material.shear_pa(),
-    };
-    body.meet(obstacle, side);
-    (1..=steps)
-        .map(|k| {
-            body.advance(k as f64 / steps as f64).with_context(|| {
-                format!("a cylinder pressed by {most} of its height, {across} cells in its radius")
-            })?;
-            Ok(body.reaction(&middle, Axis::Along))
-        })
-        .collect()
-}
-
-/// Of elements whose error falls with the square of their size.
-pub fn limit(coarse: f64, fine: f64) -> f64 {
-    fine + (fine - coarse) / 3.0
-}
-
 /// Stress over a homogeneous bar's at the strains that are solved, from rest on.
 type Row = [f64; STEPS + 1];
 
@@ -134,8 +87,11 @@ fn row(family: Family, constant: f64) -> Result<Row> {
     }
     .with_law(family.law(constant)?);
     let terms = family.terms(constant)?;
-    let [coarse, fine] =
-        CELLS.map(|cells| held([RADIUS_MM, HALF_MM], &material, MOST, STEPS, cells));
+    let solved = |cells| {
+        held([RADIUS_MM, HALF_MM], &material, MOST, STEPS, cells)
+            .with_context(|| format!("a cylinder pressed by {MOST} of its height"))
+    };
+    let [coarse, fine] = CELLS.map(solved);
     let area = std::f64::consts::PI * RADIUS_MM * RADIUS_MM;
     let mut out = [0.0; STEPS + 1];
     for (k, (coarse, fine)) in coarse?.into_iter().zip(fine?).enumerate() {
@@ -300,8 +256,9 @@ fn phantom_rows(phantoms: &[Phantom], fits: &[Fit], solved: &Solved) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{CELLS, Family, Fit, Solved, held, limit};
+    use super::{CELLS, Family, Fit, Solved};
     use crate::fit::curve::{Curve, Mode};
+    use crate::fit::specimen::{held, limit};
     use crate::validate::silicone::{FITTED, Phantom};
     use elements::Material;
 

@@ -9,10 +9,10 @@ use elements::{Law, Ogden};
 use gauge::median;
 
 use super::section::{Section, verdict};
-use crate::fit::Wanted;
 use crate::fit::data::{self, Sample};
 use crate::fit::plot;
 use crate::fit::stretches::best;
+use crate::fit::wanted::Wanted;
 use crate::materials;
 
 /// Worst and median R² that are promised.
@@ -55,7 +55,7 @@ pub fn section(path: &Path) -> Result<Section> {
     for sample in &samples {
         let mut fits = Vec::new();
         for (at, (name, wanted)) in LAWS.iter().enumerate() {
-            let terms = best(&sample.curves, &wanted.exponents())?;
+            let terms = best(&sample.curves[..], &wanted.exponents())?;
             of_law[at].extend(row(&mut text, name, sample, &terms));
             fits.push(terms);
         }

@@ -7,10 +7,10 @@ use elements::{Deformation, Law, Material, Moduli, Ogden, stress};
 use tissue::mesh::{Mesh, regular_box};
 use tissue::statics::relax;
 
-use super::between_plates::{self, limit};
 use super::equilibrium::{ends, forces};
 use super::section::Section;
 use super::torsion::torsion;
+use crate::fit::specimen::{held, limit};
 use crate::materials;
 
 /// Length and side of the rod, mm.
@@ -114,8 +114,8 @@ fn squeezed(material: &Material, cells: usize) -> Result<f64> {
 /// The same by the tetrahedra and by the body of revolution, both in the limit of two meshes.
 pub fn squeezed_both(material: &Material) -> Result<[f64; 2]> {
     let [coarse, fine] = CELLS.map(|cells| squeezed(material, cells));
-    let turned = [[10, 10], [20, 20]]
-        .map(|cells| between_plates::held([RADIUS, 0.5 * LENGTH], material, SQUEEZE, 1, cells));
+    let turned =
+        [[10, 10], [20, 20]].map(|cells| held([RADIUS, 0.5 * LENGTH], material, SQUEEZE, 1, cells));
     let [few, many] = turned;
     Ok([limit(coarse?, fine?), limit(few?[0], many?[0])])
 }

@@ -8,9 +8,9 @@ use elements::{Law, Material};
 use std::f64::consts::PI;
 use tissue::axisymmetric::{Axis, Equilibrium, Obstacle, Section as Plane, Shape};
 
-use super::between_plates::limit;
 use super::closed_forms::squeezed_both;
 use super::section::Section;
+use crate::fit::specimen::limit;
 use crate::materials;
 
 /// Cells in the radius of contact, and how much larger each next one is from [`EVEN`] of them on.

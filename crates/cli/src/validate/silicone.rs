@@ -10,11 +10,11 @@ use elements::Ogden;
 use gauge::median;
 
 use super::section::{Section, verdict};
-use crate::fit::Wanted;
 use crate::fit::curve::{Curve, Mode, nominal_stress};
 use crate::fit::data::Table;
 use crate::fit::plot;
 use crate::fit::stretches::best;
+use crate::fit::wanted::Wanted;
 
 /// Median and worst relative error of the force that are promised.
 pub const BAR: [f64; 2] = [0.05, 0.10];

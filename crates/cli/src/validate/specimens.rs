@@ -118,7 +118,7 @@ fn r2(curve: &Curve, law: &Ogden, shape: &Shape) -> f64 {
 }
 
 fn fit(sample: &Sample) -> Result<Fit> {
-    let mut law = best(&sample.curves, &Exponents::Free(1))?;
+    let mut law = best(&sample.curves[..], &Exponents::Free(1))?;
     let shapes = |law: &Ogden| -> Result<Vec<Shape>> {
         sample
             .curves
@@ -136,7 +136,7 @@ fn fit(sample: &Sample) -> Result<Fit> {
                     .collect(),
             })
             .collect();
-        law = best(&freed, &Exponents::Free(1))?;
+        law = best(&freed[..], &Exponents::Free(1))?;
         own = shapes(&law)?;
     }
     let curves = sample.curves.iter().zip(&own);
@@ -160,7 +160,7 @@ pub fn section(path: &Path) -> Result<Section> {
     );
     let mut all = Vec::new();
     for sample in &samples {
-        let plain = best(&sample.curves, &Exponents::Free(1))?;
+        let plain = best(&sample.curves[..], &Exponents::Free(1))?;
         let found = fit(sample)?;
         let alpha = |law: &Ogden| law.terms.iter().next().map_or(0.0, |term| term.alpha);
         let list = |values: Vec<f64>| -> String {
