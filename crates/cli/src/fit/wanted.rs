@@ -119,7 +119,8 @@ impl Wanted {
     fn law(self, terms: &Ogden) -> Law {
         let part = |alpha: f64| -> f64 {
             let terms = terms.terms.iter().filter(|term| term.alpha == alpha);
-            terms.map(|term| 0.5 * term.mu_pa * term.alpha).sum()
+            // The sum of none is minus zero.
+            0.0 + terms.map(|term| 0.5 * term.mu_pa * term.alpha).sum::<f64>()
         };
         match self {
             Self::MooneyRivlin => Law::MooneyRivlin(MooneyRivlin {
