@@ -188,7 +188,7 @@ fn nearest<L>(
             whole += wanted * wanted;
         });
         let scale = both / square;
-        if !is_sound || !(scale > 0.0 && scale.is_finite()) {
+        if !(is_sound && scale > 0.0 && scale.is_finite()) {
             continue;
         }
         for unknown in start.iter_mut().filter(|unknown| unknown.is_stiffness) {
