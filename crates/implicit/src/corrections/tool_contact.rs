@@ -53,6 +53,9 @@ const EVALUATIONS: u32 = 2;
 /// Work of an evaluation for each node, in multiplications of contact solves.
 const EVALUATION_WORK: u64 = 200;
 
+/// Of a contact solve on the linear response besides the solve, for each node that tools may touch: its field there, and what the forces change.
+const PRESS_WORK: u64 = 250;
+
 /// Parts of the tools' way after which a guess that inverts elements is improved by an iteration, at most.
 const MOST_PARTS: u32 = 4;
 
@@ -267,6 +270,8 @@ impl ToolStep<'_> {
     /// coordinates take on `A_k B^T (f' - f)`. Slips are counted from `start`.
     fn press(&mut self, start: &[f32], way: f32, u: &[f32]) -> Result<()> {
         let env = self.context.env();
+        let touched = self.solver.preconditioner.basis.domain_nodes.len() as u64;
+        self.problem.work.take_whole(PRESS_WORK * touched);
         self.solver
             .preconditioner
             .decode_domain(env, &mut self.solver.fields.touched)?;

@@ -13,6 +13,8 @@ const WORK_A_MS: u64 = 4_000_000;
 const SOLVES_WORK: u64 = 20_000_000;
 /// The same bound for a step in which no tool may lose its contact: a broad tool put into the tissue needs it to find its way out.
 const LONGEST_SOLVES_WORK: u64 = 3 * SOLVES_WORK;
+/// The same bound for a step in which a tool was put elsewhere: its contact is that of the steps that follow.
+const LEAP_SOLVES_WORK: u64 = SOLVES_WORK / 2;
 /// Work of what a step does beyond its first attempt and those of its substeps, iterations and what they are made with included, at least and for each node: about
 /// forty milliseconds at 21,708 nodes. A first attempt takes the iterations that the host asks for, in a near set of any size; those that follow it have lost the tools before.
 const STEP_WORK: u64 = 2 * FAR_WORK;
@@ -118,6 +120,9 @@ impl Work {
         self.whole = self.whole.min(FAR_WORK);
         self.is_bounded = true;
         self.leaps |= leaps;
+        if leaps {
+            self.solves = self.solves.min(LEAP_SOLVES_WORK);
+        }
     }
 
     /// Whether tools go farther than hands do, so that the step ends early.
