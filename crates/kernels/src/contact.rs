@@ -56,8 +56,11 @@ impl FactorReport {
 #[derive(Debug, Default, HeldBytes)]
 pub struct ContactFactor {
     order: usize,
+    /// `U [3m,3m]` in the upper triangle, row-major; what is below it is scratch. Its length is what the last block needed.
     upper: Vec<f64>,
+    /// The right side of a solve in f64, `[3m]`.
     right: Vec<f64>,
+    /// Whether `upper` is a factor: false before the first one, and after one that could not be made.
     ready: bool,
 }
 

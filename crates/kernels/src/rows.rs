@@ -207,6 +207,8 @@ impl RowPlan {
         Ok(plan)
     }
 
+    /// Ends the run of a block that began at `start`, if it has nodes, and begins the next one there. A run never spans two
+    /// blocks, so all its rows have one rank.
     fn end_run(&mut self, block: usize, start: &mut usize) {
         if self.locals.len() > *start {
             self.runs.push(Run {
@@ -279,6 +281,7 @@ pub fn decode_rows(
 
 /// A stored number that registers can be filled from.
 pub(super) trait Number: Copy {
+    /// The number as f32, without rounding.
     fn wide(self) -> f32;
     /// `N` numbers.
     unsafe fn lanes<V: DenseLanes>(from: *const Self) -> V;
@@ -304,6 +307,8 @@ impl Number for f16 {
     }
 }
 
+/// The rows of a block's nodes one after another, in plain Rust: `basis` and `q` are those of the block, `[3 n_k,r_k]` and
+/// `[r_k]`.
 fn nodes_scalar<T: Number>(
     basis: &[T],
     q: &[f32],

@@ -217,6 +217,7 @@ impl Compliance {
     }
 }
 
+/// Whether the block of columns `i` and `j` stands in `upper` already: both are columns that an earlier gather had.
 fn are_known(known: &[bool], i: usize, j: usize) -> bool {
     !known.is_empty() && known[i] && known[j]
 }
@@ -259,6 +260,7 @@ impl Near {
         })
     }
 
+    /// As [`Compliance::gather`]: stored neighbours as they are, and other pairs as [`far_block`] has them.
     fn gather<T: From<f32>>(
         &self,
         bases: Bases<'_>,

@@ -37,6 +37,8 @@ impl Release {
     }
 
     /// `[b, b_before]` a step later.
+    /// Both are `[2r]`, mm: the state is the remainder `b` and the one before it, so that the map is a recurrence of two
+    /// steps.
     pub fn advance(&self, state: &[f32], next: &mut [f32]) {
         let (b_next, before_next) = next.split_at_mut(self.count);
         before_next.copy_from_slice(&state[..self.count]);

@@ -24,21 +24,32 @@ pub struct SolveReport {
 #[derive(Debug, HeldBytes)]
 pub struct ContactResponse {
     factored: Factored,
+    /// Columns of the last solve, ascending, each once `[m]`.
     pub(super) columns: Vec<u32>,
+    /// Their degrees of freedom, `3 column + axis` `[3m]`: what the factor is known by.
     rows: Vec<u32>,
     /// The rows of the tables that they are.
     stored: Vec<u32>,
+    /// What is imposed on them, mm `[3m]`: of each column its own node's, or the mean of those that borrow it.
     values: Vec<f32>,
+    /// Room of the compliance's far blocks: six rows of the widest block's rank.
     widened: Vec<f32>,
+    /// What answers them, mN `[3m]`; of the last solve until the next.
     pub(super) forces: Vec<f32>,
+    /// Zeros but while [`ContactResponse::solve`] collects, so that a call costs what it is given and not what the table
+    /// has.
     pub(super) imposed: Imposed,
 }
 
 /// The factor of the compliance of some rows.
 #[derive(Debug, HeldBytes)]
 struct Factored {
+    /// Of the compliance of `rows`; of nothing where they are empty.
     factor: ContactFactor,
+    /// What the factor was made of. They are cleared before a new one is made, so that one that could not be made is made
+    /// anew.
     rows: Vec<u32>,
+    /// Whether a Tikhonov term was added, which each solve with the factor reports again.
     regularised: bool,
 }
 

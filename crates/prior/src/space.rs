@@ -43,12 +43,14 @@ pub struct CoarseSpace {
     /// Inverses of the Galerkin matrix that cut bodies have asked for, by the bits of kappa: the intact body's products serve all that have lost nothing.
     #[held(skip)]
     inverses: Arc<Mutex<Inverses>>,
+    /// Whether inverses are kept: in the space of a cut body, since each further cut makes a space anew and asks again.
     keeps: bool,
     /// Of the kernels that read the modes.
     #[held(skip)]
     isa: Isa,
 }
 
+/// Bits of kappa, and the inverse `[r,r]`, mm/µN. A scene has few lengths of step, so the list stays short.
 type Inverses = Vec<(u64, Vec<f32>)>;
 
 impl CoarseSpace {
@@ -212,6 +214,8 @@ impl CoarseSpace {
         Ok(made)
     }
 
+    /// The same, made anew: a Cholesky factor in f64, and a solve for each column of the unit matrix. The matrix is
+    /// symmetric, so rows and columns are one.
     fn inverse(&self, kappa: f64, isa: Isa) -> Result<Vec<f32>> {
         let (count, galerkin) = (self.count(), self.galerkin(kappa)?);
         let mut factor = ContactFactor::try_with_capacity(count)?;

@@ -39,6 +39,7 @@ pub(super) fn response(
     let shape = [Some(columns), Some(stride)];
     let widths = file.raw("response_widths", Dtype::U8, &shape)?;
     let steps = steps(file, "response_step", columns)?;
+    // Of one node: the widths of its groups, two bits each.
     let own = |node: usize| &widths[node * stride..][..stride];
     let of_node = |node| (0..groups).map(move |group| 3 * bits(own(node), group));
     let total = (0..columns).flat_map(of_node).sum();
@@ -47,6 +48,8 @@ pub(super) fn response(
     fits(file, "response_widths", size, widths.len() + total)?;
 
     let blocks = rank_offsets.len() - 1;
+    // Of each block the groups up to the last one that has codes: what [`Response::leading`] keeps, so that a step reads
+    // no more.
     let mut kept = memory::room(columns * blocks, WHAT)?;
     for node in 0..columns {
         for pair in rank_offsets.windows(2) {
@@ -64,6 +67,7 @@ pub(super) fn response(
     let mut to = values.chunks_exact_mut(GROUP);
     let mut starts = memory::room(groups, WHAT)?;
     for (node, &step) in steps.iter().enumerate() {
+        // Where each group's codes start among the node's: the three rows of a group follow each other.
         starts.clear();
         let mut end = 0;
         for bytes in of_node(node) {

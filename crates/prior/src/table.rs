@@ -23,12 +23,16 @@ pub struct PriorTable {
     pub contact_nodes: Vec<u32>,
     /// Of each of the latter: the column of the tables whose response it has.
     sources: Vec<u32>,
+    /// Of the columns of the tables with each other; a cut body has the intact body's, and asks it for what its columns
+    /// borrow.
     #[held(own)]
     compliance: Arc<Compliance>,
+    /// The basis that decodes `q`, and projects on it.
     blocks: Blocks,
     /// Response of a unit force on a column of the tables `[3D,Q]`, mm/mN; see [`PriorTable::stored_dof`].
     #[held(own)]
     pub response: Arc<Response>,
+    /// Of a learned map; a cut body has none, since the map knows the intact body alone.
     pub learned: LearnedTables,
     /// For each node the column (index into `contact_nodes`) of itself or of the nearest contact node within
     /// four typical edges of the domain; `NO_COLUMN` for nodes farther away.

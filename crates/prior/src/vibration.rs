@@ -29,6 +29,7 @@ pub struct FreeVibration {
     projection: Vec<f32>,
     /// `0..m`, as the row list of the product with `modes`; of the learned modes its first `r`.
     rows: Vec<u32>,
+    /// Natural modes, `m`: those of [`FreeVibration`], without the learned ones.
     count: usize,
     /// The learned map; empty where the file has none.
     release: Release,

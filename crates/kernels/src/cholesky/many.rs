@@ -16,11 +16,15 @@ pub type Sides = [f32; SIDES];
 /// Room for the right sides: permuted, and those of one front.
 #[derive(Default, HeldBytes)]
 pub struct ManySides {
+    /// By row in the order of elimination `[n]`.
     pub permuted: Vec<Sides>,
+    /// The rows of the front that is worked on, `[widest]`: its own first, then those that it updates.
     pub gathered: Vec<Sides>,
 }
 
 impl ManySides {
+    /// Makes room and zeros for a factor of `rows` rows whose widest front has `widest`; `what` names it where memory runs
+    /// out. The room stays for the next call.
     pub fn fit(&mut self, rows: usize, widest: usize, what: &str) -> Result<()> {
         for (list, count) in [(&mut self.permuted, rows), (&mut self.gathered, widest)] {
             list.clear();
@@ -40,6 +44,7 @@ by_isa! {
     pub fn back(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) = back_body, back_scalar;
 }
 
+/// Row after row; the diagonal of `upper` holds reciprocals, so that no side divides.
 fn forward_scalar(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) {
     for (k, row) in upper.chunks_exact(width).enumerate() {
         let (own, later) = x[k..].split_at_mut(1);
@@ -54,6 +59,7 @@ fn forward_scalar(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) {
     }
 }
 
+/// From the last row to the first; what is later than the front's own rows, `x2`, is known and stays as it is.
 fn back_scalar(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) {
     for (k, row) in upper.chunks_exact(width).enumerate().rev() {
         let (own, later) = x[k..].split_at_mut(1);
@@ -68,6 +74,11 @@ fn back_scalar(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) {
     }
 }
 
+/// The same by panels of eight rows. Each side is a lane, and each of its values takes the rows in the order of the scalar
+/// way.
+///
+/// # Safety
+/// The instruction set of `V` is there, and `V::COUNT` divides [`SIDES`].
 #[inline(always)]
 unsafe fn forward_body<V: DenseLanes>(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) {
     assert!(upper.len() / width <= width && width <= x.len(), "a front");
@@ -114,6 +125,10 @@ unsafe fn forward_body<V: DenseLanes>(upper: &[f32], width: usize, count: usize,
     }
 }
 
+/// Likewise; in a panel the columns behind it come first, from left to right, then its own triangle from below.
+///
+/// # Safety
+/// As [`forward_body`].
 #[inline(always)]
 unsafe fn back_body<V: DenseLanes>(upper: &[f32], width: usize, count: usize, x: &mut [Sides]) {
     assert!(upper.len() / width <= width && width <= x.len(), "a front");

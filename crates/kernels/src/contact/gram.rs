@@ -5,6 +5,8 @@ use lanes::{Isa, by_isa};
 
 use crate::math::fused;
 
+/// `U^T Y = Z` in place, a column of `z [3m,n]` after another: the readable way, which the tests compare the other with.
+/// Reads the upper triangle of `u` alone.
 fn whiten_rows_scalar(u: &[f64], columns: usize, z: &mut [f64]) {
     let n = z.len() / columns.max(1);
     for k in 0..n {
@@ -55,6 +57,12 @@ fn gram_scalar(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) {
 
 by_isa! { fn gram(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) = gram_body, gram_scalar; }
 
+/// The same in tiles of four rows by sixteen, four or one columns from the diagonal on. A tile's sum over the rows of `z`
+/// is made before `upper` is touched, so a number depends on its row and column alone and not on the tile that it fell
+/// into.
+///
+/// # Safety
+/// The instruction set of `V` is there; all places are checked.
 #[inline(always)]
 unsafe fn gram_body<V: DenseLanes>(z: &[f64], columns: usize, scale: f64, upper: &mut [f64]) {
     let n = columns;

@@ -118,12 +118,18 @@ fn subtract_tile<V: DenseLanes, const R: usize, const C: usize>(
     subtract_scaled_tile::<V, R, C>(block, rows, n, i, j, 1.0);
 }
 
+/// The same loops without the instructions of a set: the compiler makes what it can of them.
 fn solve_upper_scalar(u: &[f64], x: &mut [f64]) {
     solve(u, x);
 }
 
 by_isa! { pub(super) fn solve_upper(u: &[f64], x: &mut [f64]) = solve_upper_body, solve_upper_scalar; }
 
+/// [`solve`], compiled for the instruction set of `V`; nothing else of `V` is used, so the bits are those of the scalar
+/// way.
+///
+/// # Safety
+/// The instruction set of `V` is there.
 #[inline(always)]
 unsafe fn solve_upper_body<V: DenseLanes>(u: &[f64], x: &mut [f64]) {
     solve(u, x);

@@ -56,6 +56,12 @@ mod x86 {
     type V = Avx512;
     const C: usize = NODES / 16;
 
+    /// The layers of [`super::super::tile`] with the products in bf16. Before each product its input is narrowed into the
+    /// scratch space's pairs, which the next one writes over; the residual stream stays f32 from the gather to the head.
+    ///
+    /// # Safety
+    /// The machine has the instructions of the attribute, and with `matrix_tiles` those of [`Tiles`]; every row lies in the
+    /// query table.
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,f16c")]
     pub(super) unsafe fn layers(
         matrix_tiles: bool,
@@ -79,6 +85,7 @@ mod x86 {
             gather::<V>(queries, rows, 2 * h, h, h, input);
             let width = h / decoder.heads;
             let tiles = matrix_tiles.then(|| Tiles::configure());
+            // Both ways take the same pairs and end with the same `finish`; they add up in another order.
             let multiply = |weights: Narrow<'_>, depth, y, finish| match &tiles {
                 Some(tiles) => multiply_tiles(tiles, weights, depth, pairs, y, finish),
                 None => multiply_pairs(weights.pairs, depth, pairs, y, finish),

@@ -7,10 +7,14 @@ use half::bf16;
 /// Outputs a group.
 pub(super) const GROUP: usize = 8;
 
+/// Numbers of a matrix `[outputs,depth]` in panels, `[outputs/8][depth][8]`: the last group is whole, with zeros for
+/// outputs that there are not.
 pub(super) fn panel_floats(outputs: usize, depth: usize) -> usize {
     outputs.next_multiple_of(GROUP) * depth
 }
 
+/// Numbers of a matrix in pairs, `[outputs/8][depth/2][8][2]`: an odd depth gets a column of zeros, since an instruction
+/// takes two features at once.
 pub(super) fn pair_count(outputs: usize, depth: usize) -> usize {
     outputs.next_multiple_of(GROUP) * depth.next_multiple_of(2)
 }
@@ -23,6 +27,8 @@ pub(super) fn block_count(outputs: usize, depth: usize) -> usize {
     outputs.next_multiple_of(amx::OUTPUTS) * depth.next_multiple_of(amx::DEPTH)
 }
 
+/// Fills `[outputs/16][depth/32][16][32]`. What lies behind the last output or feature is left as it is: the room is made
+/// of zeros, and each call for the same matrix writes the same places.
 pub(super) fn pack_blocks(
     blocks: &mut [bf16],
     outputs: usize,
@@ -41,6 +47,8 @@ pub(super) fn pack_blocks(
     }
 }
 
+/// Fills panels, `[outputs/8][depth][8]`: the eight weights that meet one feature lie beside each other. `weight(o, k)` is
+/// asked once for each number, and may read another layout or a matrix that is turned.
 pub(super) fn pack(
     panels: &mut [f32],
     outputs: usize,
@@ -57,6 +65,7 @@ pub(super) fn pack(
     }
 }
 
+/// Fills pairs, `[outputs/8][depth/2][8][2]`, rounded to the nearest bf16; every number of the room is written, zeros too.
 pub(super) fn pack_pairs(
     pairs: &mut [bf16],
     outputs: usize,

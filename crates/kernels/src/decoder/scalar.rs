@@ -25,6 +25,9 @@ pub(super) fn tile(
     }
 }
 
+/// One node, from its row `[x | q]` of the query table to its displacement, mm, before the bundle's `base`: attention with
+/// its residual, the MLP with its residual, the head. LayerNorm has no scale and no shift here: [`PackedDecoder`] has
+/// folded those of LN_2 and LN_3 into `mlp1` and `head`.
 fn node(decoder: &PackedDecoder, tokens: &DecoderTokens, x: &[f32], q: &[f32]) -> [f32; 3] {
     let y = add(
         x,
@@ -60,6 +63,8 @@ fn attention(decoder: &PackedDecoder, tokens: &DecoderTokens, q: &[f32]) -> Vec<
     out
 }
 
+/// `W x + b` from the plain matrix. The bias is padded to a multiple of eight; the rows of `plain` are not, and `zip` ends
+/// with the shorter.
 fn linear(layer: &Linear, x: &[f32]) -> Vec<f32> {
     layer
         .plain
@@ -69,6 +74,7 @@ fn linear(layer: &Linear, x: &[f32]) -> Vec<f32> {
         .collect()
 }
 
+/// Mean 0 and variance 1 over the features, with [`EPS`] beside the variance: two passes, as [`super::tile`] makes them.
 fn normalise(x: &[f32]) -> Vec<f32> {
     let n = x.len() as f32;
     let mean = x.iter().sum::<f32>() / n;

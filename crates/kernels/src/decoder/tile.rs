@@ -43,10 +43,13 @@ pub(super) struct Layout {
         expect(dead_code, reason = "only x86-64 multiplies bf16")
     )]
     pub pairs: usize,
+    /// Numbers in all: what [`scratch_floats`] gives for the largest tile.
     pub total: usize,
 }
 
 impl Layout {
+    /// For a tile of `nodes` nodes and `tokens` latent tokens. Every array begins at a whole number of rows, so that each
+    /// row is as aligned as the first.
     pub(super) fn new(decoder: &PackedDecoder, tokens: usize, nodes: usize) -> Self {
         // A head's last group may write up to 7 rows beyond its own.
         let h = (decoder.hidden + GROUP).next_multiple_of(GROUP);
@@ -69,6 +72,7 @@ by_isa! {
         scratch: &mut [f32], out: &mut [f32]) = body, scalar_tile;
 }
 
+/// The readable reference behind the same door, for `UPT_ISA=scalar`; it needs no scratch space.
 fn scalar_tile(
     decoder: &PackedDecoder,
     tokens: &DecoderTokens,
@@ -80,6 +84,11 @@ fn scalar_tile(
     scalar::tile(decoder, tokens, queries, rows, scratch, out);
 }
 
+/// Chooses the register tile, `R` outputs by `C` registers of nodes: 8 x 3 of the 32 registers of AVX-512, 4 x 2 of the 16
+/// of AVX2, 8 x 2 of NEON's 32. `C V::COUNT` is what [`nodes`] says for the instruction set.
+///
+/// # Safety
+/// The instruction set of `V` is there, and every row lies in the query table.
 #[inline(always)]
 unsafe fn body<V: DenseLanes>(
     decoder: &PackedDecoder,
@@ -99,6 +108,11 @@ unsafe fn body<V: DenseLanes>(
     }
 }
 
+/// All layers for one tile. Arrays are `[rows][nodes]`: a node is a lane, and no lane reads another, so a node's bits do
+/// not depend on its neighbours in the tile. The order of the layers is that of the module's equation.
+///
+/// # Safety
+/// As [`body`].
 #[inline(always)]
 unsafe fn layers<V: DenseLanes, const R: usize, const C: usize>(
     decoder: &PackedDecoder,

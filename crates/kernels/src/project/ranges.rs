@@ -47,6 +47,7 @@ by_isa! {
     fn range_f16(table: &[f16], rows: &[u32], ranges: &[Range<usize>], q: &[f32], out: &mut [f32]) = range_body, range_scalar;
 }
 
+/// Row after row in plain Rust: eight sums, by the column's place in its eight, through all ranges, added up at the end.
 fn range_scalar<T: Number>(
     table: &[T],
     rows: &[u32],
@@ -72,6 +73,10 @@ fn range_scalar<T: Number>(
     }
 }
 
+/// Vectors in threes, then one at a time: three share each number of the table that is read.
+///
+/// # Safety
+/// The instruction set of `V` is there; rows and ranges were checked by [`row_dots_in`].
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
 unsafe fn range_body<V: DenseLanes>(

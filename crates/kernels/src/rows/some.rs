@@ -122,6 +122,7 @@ by_isa! {
     fn products_f16(basis: &[f16], table: (&[[u32; 2]], &[usize]), ranks: &[u32], of_rows: &[(u32, [f32; 3])], q: &mut [f32]) = products_body, products_scalar;
 }
 
+/// Of [`project_products`], in plain Rust.
 fn products_scalar<T: Number>(
     basis: &[T],
     table: (&[[u32; 2]], &[usize]),
@@ -136,6 +137,11 @@ fn products_scalar<T: Number>(
     });
 }
 
+/// The same a register at a time. Each coordinate is added to once for each row and component, in the order of `of_rows`,
+/// as in the scalar way; no two lanes meet.
+///
+/// # Safety
+/// The instruction set of `V` is there; lengths are checked.
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
 unsafe fn products_body<V: DenseLanes>(
@@ -221,6 +227,8 @@ by_isa! {
     fn add_f16(basis: &[f16], locals: &[u32], outputs: &[u32], r: &[f32], q: &mut [f32]) = add_rows_body, add_rows_scalar;
 }
 
+/// `q += U^T r` of some nodes of one block: `basis [3 n,rank]`, `q [rank]`, node `locals[i]` of the block with the field's
+/// row `outputs[i]`.
 fn add_rows_scalar<T: Number>(
     basis: &[T],
     locals: &[u32],
@@ -240,6 +248,11 @@ fn add_rows_scalar<T: Number>(
     }
 }
 
+/// The same by strips of up to eight registers of coordinates, which stay in registers while all nodes pass: each number of
+/// the basis is read once, and `q` is read and written once. A coordinate adds its nodes up in the order of the list.
+///
+/// # Safety
+/// The instruction set of `V` is there; the highest node and the rank are checked here.
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
 unsafe fn add_rows_body<V: DenseLanes>(

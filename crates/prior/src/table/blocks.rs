@@ -17,6 +17,8 @@ pub(super) struct Blocks {
     pub rank_offsets: Vec<u32>,
     /// Of a cut body: nodes with rows of their own before each block, and whose rows each node of `nodes` has ([`Copies`]).
     pub copies: Option<(Vec<u32>, Vec<u32>)>,
+    /// `[sum_k 3 n_k r_k]`, row-major by block; a cut body has the intact body's, and its copies have their parents' rows
+    /// in it.
     #[held(own)]
     pub numbers: Arc<Numbers>,
     /// By node: where its rows start, where its block's coordinates start, and how many.

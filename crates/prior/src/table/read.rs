@@ -102,6 +102,7 @@ impl PriorTable {
             .zip(rank_offsets.windows(2))
             .map(|(nodes, ranks)| 3 * (nodes[1] - nodes[0]) * (ranks[1] - ranks[0]))
             .sum();
+        // Three rows a node, in the order of the blocks: what every later table refers to.
         let places = basis_places(&block_nodes, &block_offsets, &rank_offsets)?;
         let compliance = Compliance::read(file, contact_nodes.len(), |i| {
             places[contact_nodes[i] as usize]
@@ -117,6 +118,7 @@ impl PriorTable {
             .reduced
             .as_ref()
             .map_or((0, 0), |reduced| (reduced.modes, reduced.response_modes));
+        // A contact outside of the domain is answered by the nearest column, and told of by a flag.
         let mut in_domain = memory::filled(count, false, WHAT)?;
         for &node in &mesh.domain_nodes {
             in_domain[node as usize] = true;
