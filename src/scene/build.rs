@@ -21,6 +21,12 @@ use crate::options::{SceneOptions, StepPath};
 /// The core of a new scene, at rest.
 ///
 /// `envelope`: that of a cut body, which need not be made anew.
+/// Called when a scene is made, and again when its body is cut or made whole: `model` is then that of the cut body, or the
+/// intact one. Nothing of a scene that is there changes, so that an error leaves it as it was.
+///
+/// # Errors
+/// [`Error::Argument`] for options out of range, [`Error::Unsupported`] for what the bundle cannot do, [`Error::Bundle`]
+/// for a mesh of the host's own or a missing part, [`Error::OutOfMemory`].
 pub(super) fn build(
     model: &Arc<Model>,
     options: &SceneOptions,
@@ -91,6 +97,7 @@ pub(super) fn build(
     let corrected = Corrector::new(model, options, isa, &pool)?;
     let corrected = corrected.map(|own| memory::boxed(own, SCENE)).transpose()?;
     let mesh = own_mesh.unwrap_or_else(|| Arc::clone(&model.mesh));
+    // Without corrections no step is integrated: the engine knows the bundle's own length alone.
     let of_scene = corrected.as_ref().map(|own| own.time_step.integrator);
     StepMaker::new(Parts {
         body: SceneBody::new(Arc::clone(model), mesh, of_scene)?,

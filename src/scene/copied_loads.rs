@@ -16,7 +16,9 @@ pub(super) struct CopiedLoads {
     /// Now, and at rest.
     gravity: [[f32; 3]; 2],
     support: Option<SupportPose>,
+    /// Whether the host gave forces by node.
     has_forces: bool,
+    /// By node of the intact mesh `[K,3]`, mN.
     forces: Vec<f32>,
     point_forces: Vec<PointForce>,
     /// One list of nodes after the other.

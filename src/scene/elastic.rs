@@ -19,11 +19,15 @@ pub struct Haptics {
     /// The contact nodes, nodes around them, and the field they are decoded into.
     nodes: Vec<u32>,
     around: Vec<u32>,
+    /// Of the nodes around the contact `[n,3]`, mm.
     decoded: Vec<f32>,
+    /// `[K,3]`, mm: true at the nodes around the contact of the last call, and read there alone.
     field: Vec<f32>,
 }
 
 impl Haptics {
+    /// For a mesh with the moduli of the bundle's material; one list of elements by node is made here, so that a call looks
+    /// at those around the contact alone.
     pub(super) fn new(mesh: &Mesh, model: &Model) -> Result<Haptics> {
         let material = &model.manifest.material;
         Ok(Haptics {
@@ -35,6 +39,11 @@ impl Haptics {
         })
     }
 
+    /// Elastic forces at the contact nodes of the last published state, in their order, mN, into `out [3n]`. Where the
+    /// scene has a region, the nodes around the contact are decoded first: the published field holds the region alone.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`](crate::Error::OutOfMemory), and those of a decoding.
     pub(super) fn reaction(
         &mut self,
         core: &mut Core,

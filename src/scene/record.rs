@@ -25,10 +25,13 @@ pub(super) const WHAT: &str = "a recording";
 pub(super) struct Record {
     /// Whether calls look for it.
     pub(super) on: AtomicBool,
+    /// Held while a line is begun and while it is ended, never during the call between: a step may take long, and the host
+    /// may take the recording meanwhile.
     recorder: Mutex<Option<Box<Recorder>>>,
 }
 
 impl Record {
+    /// The recording of this moment.
     pub(super) fn lock(&self) -> MutexGuard<'_, Option<Box<Recorder>>> {
         self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -124,6 +127,7 @@ pub(super) fn step(recorder: &mut Recorder, input: &StepInput<'_>) -> Result<()>
     recorder.open_step(line)
 }
 
+/// The loads of a line, which borrows their lists.
 fn loading<'a>(loads: &Loads<'a>) -> Result<Loading<'a>> {
     let pose = |pose: SupportPose| Pose {
         position: pose.position,

@@ -103,6 +103,7 @@ impl Copied {
         self.loads.with(|loads| call(self.input(loads)))
     }
 
+    /// The input as it was submitted, with loads that borrow from the same copy.
     fn input<'a>(&'a self, loads: Loads<'a>) -> StepInput<'a> {
         StepInput {
             displacement: self.starts.then_some(&*self.displacement),
@@ -237,6 +238,7 @@ impl Worker {
         Self::progress(&mut slot)
     }
 
+    /// What a poll or a wait returns now; an error is taken out, so that it is told once.
     fn progress(slot: &mut Slot) -> Result<Progress> {
         if !slot.ever {
             return Err(Error::State("nothing was submitted".into()));
@@ -254,6 +256,8 @@ impl Worker {
         Ok(Progress::Done)
     }
 
+    /// Starts the thread at the first submit; it lives until the worker is dropped. It holds the scene's shared part, not
+    /// the scene, so that the scene can go while it sleeps.
     fn start(&self, shared: &Arc<Shared>) -> Result<()> {
         let mut thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
         if thread.is_some() {

@@ -32,6 +32,8 @@ use step_blend::StepBlend;
 /// What makes a scene's frames, each part from its first use.
 #[derive(Default, HeldBytes)]
 pub struct Presenters {
+    /// One each for the region, the attached points and the vertices of a cut surface: each has its own blend between
+    /// steps, and a host may show them at different moments.
     region: Option<Box<Presenter>>,
     points: Option<Box<Presenter>>,
     surface: Option<Box<Presenter>>,
@@ -45,6 +47,7 @@ struct Presenter {
     /// What it shows by the nodes around them; none: the region.
     #[held(skip)]
     attached: Option<Arc<AttachedPoints>>,
+    /// The known step and the tissue after it.
     between: Between,
     /// The region and its rows.
     region: Vec<u32>,
@@ -54,6 +57,7 @@ struct Presenter {
     shown: Vec<f32>,
     /// The frame at the region's nodes.
     nodal: Vec<f32>,
+    /// What is left of the difference that the last step's arrival made.
     step_blend: StepBlend,
     /// Time of the last frame, after its step.
     before_s: f64,
@@ -107,6 +111,7 @@ impl Presenters {
 }
 
 impl Presenter {
+    /// Nothing is known yet: the first frame takes the step and the nodes that it shows.
     fn new(scene: &Tissue<'_>) -> Result<Presenter> {
         Ok(Presenter {
             attached: None,

@@ -36,6 +36,9 @@ impl UptEngine {
         done
     }
 
+    /// Decodes rows of the query table of the mesh into the same rows of `out [n,3]`: by the graph itself where it has made
+    /// whole fields (`step.onnx`, for the state being made alone), by the decoder that holds the table on its device, or by
+    /// rows.
     fn decode_nodes(
         &mut self,
         compute: Compute<'_>,
