@@ -18,6 +18,7 @@ const WHAT: &str = "the corrections of a scene";
 /// The stage of a scene that corrects, and how far it goes.
 #[derive(HeldBytes)]
 pub struct Corrector {
+    /// What iterates, and the motion that it remembers between steps.
     pub solver: Box<ImplicitSolver>,
     /// Steps in parts.
     pub(super) parts: StepParts,

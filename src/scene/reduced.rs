@@ -50,6 +50,7 @@ pub struct ReducedEngine {
 /// Session and buffers of the correction network.
 #[derive(HeldBytes)]
 struct LearnedStage {
+    /// One input with the groups of the manifest one after another, one output `b' [r]`.
     stage: Stage,
     #[held(skip)]
     precision: Precision,

@@ -82,11 +82,15 @@ pub fn take_rows(field: &[f32], nodes: &[u32], out: &mut [f32]) {
     }
 }
 
+/// A lock whose holder panicked: the scene that it belongs to is given up, as after any panic.
 fn internal(error: impl std::fmt::Display) -> Error {
     Error::Panic(error.to_string())
 }
 
 /// The portable path: `decoder.onnx` over tiles of fixed size, one session a thread.
+///
+/// `queries [n,query]`, the same rows of `out [n,3]`; no node twice. All tiles are tried; the first error is returned, and
+/// what `out` holds then does not count.
 pub fn decode_tiles(
     stages: &[Mutex<Stage>],
     pool: &Pool,

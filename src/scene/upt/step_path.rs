@@ -25,6 +25,7 @@ pub struct Parts<'a> {
     pub kind: &'a Arc<UptModel>,
     pub tables: &'a Arc<UptTables>,
     pub pool: &'a Pool,
+    /// Of the scene's mesh, which may be one of the host's own.
     pub node_count: usize,
 }
 
@@ -96,6 +97,8 @@ impl Parts<'_> {
         Ok(engine)
     }
 
+    /// The path whose median is shorter; both are timed in turns, so that what else the device does meets both. The other
+    /// one's sessions are dropped.
     fn faster(&self, mut split: UptEngine, mut whole: UptEngine) -> Result<UptEngine> {
         let mut field = memory::zeros(3 * self.node_count, "a timed step")?;
         let (mut split_ms, mut whole_ms) = (Vec::new(), Vec::new());
@@ -129,6 +132,7 @@ impl Parts<'_> {
     }
 }
 
+/// What runs the engine's network: paths are compared only where it is the same.
 fn provider(engine: &UptEngine) -> Provider {
     engine.stage().choice().provider
 }
