@@ -12,6 +12,7 @@ const CLOSE: f32 = 1e-4;
 /// Faces of less than this share of the surface may be slivers, whose normal is rounding.
 const NO_FACE: f32 = 1e-3;
 
+/// A closed surface in the tool's own frame, mm, whose faces look outward; made once, read by all threads.
 #[derive(Clone, Debug)]
 pub(crate) struct Triangles {
     faces: TriMesh,
@@ -107,6 +108,7 @@ impl Triangles {
         }
     }
 
+    /// Turns the surface outward by the sign of its volume, and refuses one that has none: a millionth of its size cubed.
     fn new(vertices: Vec<Vector>, mut faces: Vec<[u32; 3]>) -> Result<Self, ShapeError> {
         let flat = |reason: String| ShapeError::Flat {
             count: vertices.len(),

@@ -31,6 +31,7 @@ fn square_bits(u: &[f32]) -> u32 {
     (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]).to_bits() & 0x7fff_ffff
 }
 
+/// The largest square over a contiguous field `[n,3]`, into `bits`, which may hold that of others.
 fn all_nodes_scalar(field: &[f32], bits: &mut u32) {
     for u in field.chunks_exact(3) {
         *bits = (*bits).max(square_bits(u));

@@ -48,6 +48,10 @@ const EXP2: [f32; 7] = [
     1.534_580_7e-4,
 ];
 
+/// A polynomial of each lane, from the highest coefficient down; `coefficients` begin with the constant.
+///
+/// # Safety
+/// See [`Lanes`].
 #[inline(always)]
 unsafe fn horner<V: DenseLanes, const M: usize>(coefficients: &[f32; M], x: V) -> V {
     // SAFETY: see `Lanes`.

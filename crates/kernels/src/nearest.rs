@@ -71,6 +71,10 @@ fn pass_scalar(
     (found.squares, found.places) = (squares, places);
 }
 
+/// The same loop, compiled for an instruction set: nothing of `V` is used, so the bits are one machine's and another's.
+///
+/// # Safety
+/// The instruction set is there.
 #[inline(always)]
 unsafe fn pass_body<V>(
     rest: &[f32],

@@ -62,6 +62,8 @@ by_isa! {
     fn block_f16(basis: &[f16], nodes: &[u32], r: &[f32], q: &mut [f32]) = block_body, block_scalar;
 }
 
+/// `q = U_k^T r` of one block in plain Rust: `basis [3 n_k,r_k]` are the rows of the block's own nodes, `q [r_k]` its
+/// coordinates.
 fn block_scalar<T: Number>(basis: &[T], nodes: &[u32], r: &[f32], q: &mut [f32]) {
     q.fill(0.0);
     let rank = q.len();
@@ -76,6 +78,11 @@ fn block_scalar<T: Number>(basis: &[T], nodes: &[u32], r: &[f32], q: &mut [f32])
     }
 }
 
+/// The same by strips of up to eight registers of coordinates. A strip passes over all nodes with its sums in registers; a
+/// coordinate adds its nodes up in the order of the block, so threads, which have whole blocks, do not change its bits.
+///
+/// # Safety
+/// The instruction set of `V` is there; lengths are checked here.
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
 unsafe fn block_body<V: DenseLanes>(
@@ -112,6 +119,10 @@ unsafe fn block_body<V: DenseLanes>(
     }
 }
 
+/// `M` registers of [`block_body`], three registers and more: so many sums keep the multipliers busy one after another.
+///
+/// # Safety
+/// The caller's: `nodes.len()` times three rows of `rank` numbers from `basis` on, of which `M` registers are read.
 #[inline(always)]
 unsafe fn tile<V: DenseLanes, const M: usize>(
     basis: *const impl Number,
@@ -210,6 +221,7 @@ by_isa! {
     fn dots_f16(table: &[f16], rows: &[u32], q: &[f32], out: &mut [f32]) = dots_body, dots_scalar;
 }
 
+/// Row after row in plain Rust: sixteen sums, by the column modulo sixteen, added up at the end.
 fn dots_scalar<T: Number>(table: &[T], rows: &[u32], q: &[f32], out: &mut [f32]) {
     for (&row, out) in rows.iter().zip(out) {
         let row = &table[row as usize * q.len()..][..q.len()];
@@ -223,6 +235,10 @@ fn dots_scalar<T: Number>(table: &[T], rows: &[u32], q: &[f32], out: &mut [f32])
     }
 }
 
+/// Four rows at a time, a sum each, one register of `q` after the other.
+///
+/// # Safety
+/// The instruction set of `V` is there; rows were checked by [`row_dots`].
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
 unsafe fn dots_body<V: DenseLanes>(

@@ -86,6 +86,7 @@ pub fn accumulate_in(
     }
 }
 
+/// Some columns in plain Rust: `table` begins at the first of them, and its rows are `width` apart; `q` are theirs.
 fn columns_scalar<T: Number>(
     table: &[T],
     width: usize,

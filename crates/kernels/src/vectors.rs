@@ -84,6 +84,7 @@ by_isa! {
     pub fn piece_dots(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) = dots_body, dots_scalar;
 }
 
+/// In plain Rust, row after row.
 fn dots_scalar(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) {
     for (row, sum) in rows.iter().zip(sums) {
         let row = &row[start..start + x.len()];
@@ -98,6 +99,11 @@ fn dots_scalar(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) {
     }
 }
 
+/// Four rows share each register of `x`; what is left at the end of a piece fills a register with zeros. A last group of
+/// fewer rows takes its last one several times, and the sums that are too many are dropped.
+///
+/// # Safety
+/// The instruction set of `V` is there; lengths are checked here.
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
 unsafe fn dots_body<V: DenseLanes>(rows: &[&[f32]], x: &[f32], start: usize, sums: &mut [f32]) {
@@ -166,6 +172,7 @@ by_isa! {
     pub fn piece_add(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) = add_body, add_scalar;
 }
 
+/// In plain Rust: a row after another over the whole piece.
 fn add_scalar(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) {
     for (row, factor) in rows.iter().zip(factors) {
         for (to, x) in to.iter_mut().zip(&row[start..]) {
@@ -174,6 +181,11 @@ fn add_scalar(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) {
     }
 }
 
+/// All rows at one register of `to` before the next: `to` is read and written once. A number takes the rows in the same
+/// order as in the scalar way.
+///
+/// # Safety
+/// The instruction set of `V` is there; lengths are checked here.
 #[inline(always)]
 #[allow(clippy::extra_unused_type_parameters)]
 unsafe fn add_body<V: DenseLanes>(rows: &[&[f32]], factors: &[f32], start: usize, to: &mut [f32]) {

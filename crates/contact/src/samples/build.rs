@@ -33,14 +33,20 @@ pub(super) fn faces_at(
     Ok((starts, around))
 }
 
+/// Makes the samples of faces, each corner and each edge once: neighbours share theirs.
 pub(super) struct Builder<'a> {
     pub positions: &'a [[f32; 3]],
     /// Those that are nodes, and the others.
     pub corners: (&'a [u32], &'a [Sample]),
+    /// Edges are cut into parts of this length at most, mm at rest.
     pub spacing: f64,
+    /// Nodes that cannot move: a sample of such nodes alone is left out, since no contact moves it.
     pub held: HashSet<u32>,
+    /// Places whose sample is made, or was left out.
     pub seen_corners: HashSet<u32>,
+    /// Edges, the smaller place first, whose samples are made.
     pub seen_edges: HashSet<(u32, u32)>,
+    /// The samples in the order of the faces that made them: corners, edges, inside.
     pub rows: Vec<Sample>,
 }
 
@@ -77,6 +83,7 @@ impl Builder<'_> {
         Ok(parts)
     }
 
+    /// Adds the sample at weights on a face's places, unless all its nodes are held.
     fn push(&mut self, places: [u32; 3], weights: [f32; 3]) -> Result<(), TryReserveError> {
         let sample = between(self.corners, places, weights);
         if sample.entries().any(|(node, _)| !self.held.contains(&node)) {
@@ -86,6 +93,7 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// Length of an edge at rest, mm.
     fn length(&self, a: u32, b: u32) -> f64 {
         let (a, b) = (self.at(a), self.at(b));
         let square = |k: usize| (f64::from(a[k]) - f64::from(b[k])).powi(2);
@@ -105,6 +113,7 @@ impl Builder<'_> {
         }
     }
 
+    /// Parts of an edge of this length, at least one.
     fn parts(&self, length: f64) -> usize {
         (length / self.spacing).ceil().max(1.0) as usize
     }
