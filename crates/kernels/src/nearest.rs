@@ -71,7 +71,7 @@ fn pass_scalar(
     (found.squares, found.places) = (squares, places);
 }
 
-/// The same loop, compiled for an instruction set: nothing of `V` is used, so the bits are one machine's and another's.
+/// The same loop, compiled for an instruction set: nothing of `V` is used, and each set gives the same bits.
 ///
 /// # Safety
 /// The instruction set is there.
