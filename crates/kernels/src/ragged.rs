@@ -52,7 +52,6 @@ fn skipped(kept: &[u8], blocks: &Range<usize>) -> usize {
 }
 
 impl<'a> Ragged<'a> {
-    /// The same without the numbers, which the kernels take by their type.
     fn layout(&self) -> Layout<'a> {
         Layout {
             starts: self.starts,
@@ -170,8 +169,7 @@ by_isa! {
     fn dots_f16(values: &[f16], layout: Layout<'_>, rows: &[u32], q: &[f32], out: &mut [f32]) = dots_body, dots_scalar;
 }
 
-/// Adds `factors[i] * row rows[i]` to the coordinates `q` of the blocks of a range, in plain Rust; what a row leaves out is
-/// neither read nor added to.
+/// In plain Rust: what a row leaves out is neither read nor added to.
 fn add_scalar<T: Number>(
     values: &[T],
     layout: Layout<'_>,
@@ -197,9 +195,6 @@ fn add_scalar<T: Number>(
 
 /// The same, the rows of a node that follow each other in the list at once: they have the same layout, and each coordinate
 /// is loaded and stored once for up to three of them. The order of the additions is that of the list.
-///
-/// # Safety
-/// The instruction set of `V` is there.
 #[inline(always)]
 unsafe fn add_body<V: DenseLanes>(
     values: &[impl Number],
@@ -261,8 +256,7 @@ unsafe fn add_node<V: DenseLanes, const M: usize>(
     }
 }
 
-/// Each row's product with `q`, in plain Rust: eight sums, by the column modulo eight, added up at the end. Blocks are of
-/// whole eights, so that leaving numbers out moves no coordinate to another of the sums.
+/// In plain Rust: eight sums, by the column modulo eight, which leaving out whole eights does not change.
 fn dots_scalar<T: Number>(
     values: &[T],
     layout: Layout<'_>,
@@ -289,9 +283,6 @@ fn dots_scalar<T: Number>(
 }
 
 /// The same, up to three rows of one node at once; a fourth sum stays zero, since registers are added up in fours.
-///
-/// # Safety
-/// The instruction set of `V` is there.
 #[inline(always)]
 unsafe fn dots_body<V: DenseLanes>(
     values: &[impl Number],
