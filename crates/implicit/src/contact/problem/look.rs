@@ -208,3 +208,55 @@ impl NearRows {
         self.rows.sort_unstable_by_key(|row| (row.tool, row.sample));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use ::contact::Samples;
+
+    use super::*;
+
+    /// What a step decodes for the contact depends on it: a row that lies elsewhere would be measured where its nodes have not been put.
+    #[test]
+    fn rows_lie_where_all_of_their_nodes_do() {
+        let places = [
+            [0.0f32, 0.0, 0.0],
+            [2.0, 0.0, 0.0],
+            [0.0, 2.0, 0.0],
+            [2.0, 2.0, 0.0],
+        ];
+        let faces = [[0, 1, 2], [1, 3, 2]];
+        let samples = Samples::new(&places, faces.into_iter(), &[], SPACING_MM);
+        let ties = TieSet::default();
+        let mut near = NearRows::new().unwrap();
+        let lies = |near: &NearRows, is_there: &dyn Fn(u32) -> bool| {
+            near.lie(ties.points(&samples), is_there)
+        };
+        assert!(
+            !lies(&near, &|_| true),
+            "a look that found nothing says nothing"
+        );
+        let row = |sample: u32| Row {
+            tool: 0,
+            sample,
+            force: Vector::ZERO,
+            far: false,
+            gap: 0.0,
+            point: Vector::ZERO,
+            outward: Vector::ZERO,
+            is_wall: false,
+        };
+        for sample in 0..samples.len() as u32 {
+            near.rows = vec![row(0), row(sample)];
+            assert!(lies(&near, &|_| true));
+            let own = |sample| -> Vec<u32> {
+                samples.at(sample).entries().map(|entry| entry.0).collect()
+            };
+            for node in [own(0), own(sample)].concat() {
+                assert!(
+                    !lies(&near, &|other| other != node),
+                    "sample {sample}, node {node}"
+                );
+            }
+        }
+    }
+}
