@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "xtask/api"))
 import api
 import blocks
 import bundles
+import calls
 import commands
 import english
 import lines
@@ -102,6 +103,8 @@ def main() -> int:
             tally.add(commands.faults(path))
     sources = sorted(path for path in known if path.suffix in english.SOURCES)
     tally.add([fault for path in sources for fault in english.faults(path)])
+    named = sorted(path for path in known if path.suffix in calls.SOURCES)
+    tally.add([fault for path in named for fault in calls.faults(path)])
     for name in ("README.md", "SUMMARY.md", "decisions/README.md"):
         tally.add(index(pages, name))
     for make in api.PAGES:
