@@ -9,6 +9,7 @@ mod closed_forms;
 mod equilibrium;
 mod half_space;
 mod relaxing_rod;
+mod relaxing_shear;
 mod section;
 mod silicone;
 mod specimens;
@@ -45,6 +46,7 @@ pub fn run(options: &Options) -> Result<ExitCode> {
         sections.push(between_plates::section(&folder.join("silicone.csv"))?);
     }
     sections.push(relaxing_rod::section()?);
+    sections.push(relaxing_shear::section()?);
     sections.push(closed_forms::section()?);
     sections.push(half_space::section()?);
     for section in &sections {
