@@ -1,7 +1,7 @@
 //! `upt validate`: laws and solver against what has been measured, and against closed forms, as a page.
 //!
 //! The data of others stay where they are: `--data FOLDER` names a folder with `brain.csv` and `silicone.csv`, whose columns
-//! `docs/reference/formats.md` describes. Without it the closed forms and the published relaxation alone are run.
+//! `docs/reference/formats.md` describes. Without it the closed forms and the relaxation alone are run.
 
 mod between_plates;
 mod brain;
