@@ -225,7 +225,7 @@ mod tests {
             [2.0, 2.0, 0.0],
         ];
         let faces = [[0, 1, 2], [1, 3, 2]];
-        let samples = Samples::new(&places, faces.into_iter(), &[], SPACING_MM);
+        let samples = Samples::new(&places, faces, &[], SPACING_MM);
         let ties = TieSet::default();
         let mut near = NearRows::new().unwrap();
         let lies = |near: &NearRows, is_there: &dyn Fn(u32) -> bool| {
