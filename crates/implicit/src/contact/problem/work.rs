@@ -35,8 +35,9 @@ const LATE_PARTS: u32 = 2;
 #[derive(Debug, HeldBytes)]
 pub struct Work {
     solves: u64,
-    /// A tool was put elsewhere, and comes out of the tissue over a few steps.
+    /// A tool was put elsewhere, and comes out of the tissue over a few steps; what that takes off the solves.
     leaps: bool,
+    spared: u64,
     /// What is left to the whole step: of [`STEP_WORK`], or of [`FAR_WORK`] where tools go farther than hands do.
     whole: u64,
     /// A first attempt at the step, or at one of its substeps, is being made.
@@ -53,6 +54,7 @@ impl Work {
         Work {
             solves: SOLVES_WORK,
             leaps: false,
+            spared: 0,
             whole: STEP_WORK,
             is_first: true,
             is_bounded: false,
@@ -88,6 +90,7 @@ impl Work {
     /// No bound on the work of the whole step: it has to end well.
     pub fn unbound(&mut self) {
         (self.whole, self.is_bounded, self.leaps) = (u64::MAX, false, false);
+        self.solves += std::mem::take(&mut self.spared);
     }
 
     /// Takes off what a solve has cost.
@@ -121,7 +124,9 @@ impl Work {
         self.is_bounded = true;
         self.leaps |= leaps;
         if leaps {
-            self.solves = self.solves.min(LEAP_SOLVES_WORK);
+            let left = self.solves.min(LEAP_SOLVES_WORK);
+            self.spared += self.solves - left;
+            self.solves = left;
         }
     }
 

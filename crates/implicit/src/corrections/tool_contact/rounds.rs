@@ -1,5 +1,6 @@
 //! The iterations of a step, in rounds: each from a base whose residual is known everywhere.
 
+use super::thrown::has_thrown;
 use super::{Iterate, ToolStep, is_sound, is_spent, over_kept};
 use crate::contact::ContactProblem;
 
@@ -34,7 +35,7 @@ struct Made {
 }
 
 impl ToolStep<'_> {
-    /// The iterations from a guess; returns the length of what they left unbalanced near the tools.
+    /// The iterations from a guess; returns the length of what they left unbalanced near the tools, without bounds where they have thrown the tissue.
     pub(super) fn improve_loaded(&mut self, at: &mut Iterate<'_>) -> Result<f64> {
         let mut made = Made::default();
         if at.det < SMALLEST_DET {
@@ -77,7 +78,10 @@ impl ToolStep<'_> {
                 self.report.extent = local.next_extent(at.u);
             }
         }
-        Ok(made.size)
+        match has_thrown(self.problem, [made.start, made.size]) {
+            true => Ok(f64::INFINITY),
+            false => Ok(made.size),
+        }
     }
 
     /// Iterations from one base.

@@ -1,4 +1,5 @@
-//! A guess that throws the tissue off balance under tools that lie still: the step begins with the last state instead.
+//! A guess that throws the tissue off balance under tools that lie still: the step begins with the last state instead. And iterations that throw it: their
+//! end is no state of the step.
 //!
 //! Deep under a thin tool the linear response of the body at rest says little: forces that change from one sample to the next throw the tissue, and
 //! iterations do not bring it back. Where tools have come nearer the last state is in balance too, but not in contact.
@@ -12,6 +13,22 @@ use crate::error::Result;
 /// A guess leaves so many times the loads out of balance at most, or what the last state does times `WORSE`: ordinary ones leave half of the loads.
 const THROWN: f64 = 2.0;
 const WORSE: f64 = 3.0;
+
+/// Iterations leave so many times more out of balance near the tools than they began with, at most, or no more than [`THROWN`] times the loads: ordinary ones
+/// leave less than they began with.
+const GROWN: f64 = 10.0;
+
+/// Whether iterations have thrown the tissue: they have left `[.., to]` out of balance near the tools, µN, and began with `[from, ..]`.
+pub(super) fn has_thrown(problem: &ContactProblem, [from, to]: [f64; 2]) -> bool {
+    to > GROWN * from && to > THROWN * libm::sqrt(squared_loads(problem))
+}
+
+/// `|B^T f|²` by rows, µN².
+fn squared_loads(problem: &ContactProblem) -> f64 {
+    let mut sum = 0.0;
+    problem.each_load(|_, force| sum += f64::from((force * 1e3).length_squared()));
+    sum
+}
 
 impl ToolStep<'_> {
     /// Begins with the last state, with the forces that it had, where the guess is much farther from balance; tells whether it does.
@@ -40,8 +57,7 @@ impl ToolStep<'_> {
 fn left_out(step: &mut ToolStep<'_>, at: &Iterate<'_>) -> (f64, f64) {
     let left = &mut step.solver.fields.q;
     take_loads(step.problem, &step.context.held.is, at.g, left);
-    let mut loads = 0.0;
-    (step.problem).each_load(|_, force| loads += f64::from((force * 1e3).length_squared()));
+    let loads = squared_loads(step.problem);
     let sum: f64 = left.iter().map(|x| f64::from(*x) * f64::from(*x)).sum();
     (libm::sqrt(sum), libm::sqrt(loads))
 }
