@@ -30,8 +30,11 @@ const FEWEST_NODES: usize = 1000;
 /// Nodes are of the core that lie this close to a centre at rest, mm, and as many mean edges.
 const CORE_MM: f32 = 20.0;
 const CORE_EDGES: f32 = 4.0;
-/// Nodes of the core, unless so few lie within an edge of the centres.
+/// Nodes of the core, unless so few lie within an edge of the centres: so many, or where a body has been cut at many nodes, [`CORE_A_CENTRE`] for each centre
+/// and [`LARGEST_CORE`] at most. What a cut has made loose no mode knows, and beyond the core nothing else moves it.
 const MOST_CORE: usize = 700;
+const CORE_A_CENTRE: usize = 4;
+const LARGEST_CORE: usize = 1600;
 
 /// What is near.
 #[derive(HeldBytes)]
@@ -229,7 +232,8 @@ impl NearSet {
             let found = self.marks.distances.iter().filter(|d| **d < reach * reach);
             found.count()
         };
-        while within(reach) > MOST_CORE && reach > far.edge_mm {
+        let most = (CORE_A_CENTRE * self.centres.len()).clamp(MOST_CORE, LARGEST_CORE);
+        while within(reach) > most && reach > far.edge_mm {
             reach *= 0.75;
         }
         for (&node, distance) in self.places.nodes.iter().zip(&self.marks.distances) {
