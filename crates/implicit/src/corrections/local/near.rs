@@ -228,10 +228,8 @@ impl NearSet {
         self.marks
             .distances
             .extend(self.places.nodes.iter().map(nearest));
-        let within = |reach: f32| {
-            let found = self.marks.distances.iter().filter(|d| **d < reach * reach);
-            found.count()
-        };
+        let distances = &self.marks.distances;
+        let within = |reach: f32| distances.iter().filter(|d| **d < reach * reach).count();
         let most = (CORE_A_CENTRE * self.centres.len()).clamp(MOST_CORE, LARGEST_CORE);
         while within(reach) > most && reach > far.edge_mm {
             reach *= 0.75;
