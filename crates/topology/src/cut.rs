@@ -138,8 +138,8 @@ impl Body {
                 is_below && corners.iter().any(|at| at[k] >= low[k] - more)
             })
         };
-        // Cheaper, and true of all of these and some others: no edge is longer than the box of its element is wide in all, and what f32 rounds off is less
-        // than a thousandth of that, or of a millimetre, in a body of metres.
+        // Cheaper, and true of all of these and some others: no edge is longer than the box of its element is wide in all. Where an element may meet the sweep
+        // its coordinates are as large as the sweep's, its own width, or both; so is what f32 rounds off them.
         let mut rounded = room(positions.len())?;
         rounded.extend(
             positions
@@ -148,12 +148,17 @@ impl Body {
         );
         let [least_of_sweep, most_of_sweep] =
             [low, high].map(|at| [at[0] as f32, at[1] as f32, at[2] as f32, 0.0]);
+        let largest = low
+            .iter()
+            .chain(&high)
+            .fold(0.0f64, |most, x| most.max(x.abs()));
+        let rounding = 16.0 * f32::EPSILON * largest as f32;
         let may_meet = |nodes: [u32; 4]| {
             let [a, b, c, d] = nodes.map(|node| rounded[node as usize]);
             let least = lower(lower(a, b), lower(c, d));
             let most = higher(higher(a, b), higher(c, d));
             let wide: [f32; 4] = std::array::from_fn(|k| most[k] - least[k]);
-            let more = (2.0 * SNAP as f32 + 1e-3) * (wide[0] + wide[1] + wide[2]) + 1e-3;
+            let more = (2.0 * SNAP as f32 + 1e-3) * (wide[0] + wide[1] + wide[2]) + rounding;
             // How far it lies outside: of all elements but a few more than its margin.
             let outside: [f32; 4] = std::array::from_fn(|k| {
                 let (over, under) = (least[k] - most_of_sweep[k], least_of_sweep[k] - most[k]);

@@ -13,7 +13,8 @@ const WORK_A_MS: u64 = 4_000_000;
 const SOLVES_WORK: u64 = 20_000_000;
 /// The same bound for a step in which no tool may lose its contact: a broad tool put into the tissue needs it to find its way out.
 const LONGEST_SOLVES_WORK: u64 = 3 * SOLVES_WORK;
-/// The same bound for a step in which a tool was put elsewhere: its contact is that of the steps that follow.
+/// The same bound for a step in which a tool was put elsewhere, whether or not one may lose its contact: where that tool comes to is found over the steps
+/// that follow.
 const LEAP_SOLVES_WORK: u64 = SOLVES_WORK / 2;
 /// Work of what a step does beyond its first attempt and those of its substeps, iterations and what they are made with included, at least and for each node: about
 /// forty milliseconds at 21,708 nodes. A first attempt takes the iterations that the host asks for, in a near set of any size; those that follow it have lost the tools before.
@@ -35,8 +36,9 @@ const LATE_PARTS: u32 = 2;
 #[derive(Debug, HeldBytes)]
 pub struct Work {
     solves: u64,
-    /// A tool was put elsewhere, and comes out of the tissue over a few steps; what that takes off the solves.
+    /// A tool was put elsewhere, and comes out of the tissue over a few steps.
     leaps: bool,
+    /// What that has taken off the solves; a step that has to end well gets it back.
     spared: u64,
     /// What is left to the whole step: of [`STEP_WORK`], or of [`FAR_WORK`] where tools go farther than hands do.
     whole: u64,
