@@ -25,27 +25,6 @@ fn ball(middle: Point, radius: f64) -> impl Fn(Point) -> f64 {
     }
 }
 
-/// Elements are looked for in f32, whose steps are eight millimetres there.
-#[test]
-fn a_body_far_from_the_origin_is_cut_in_the_same_elements() {
-    const FAR: f64 = (1u64 << 27) as f64;
-    let mesh = block([6, 4, 3], 5.0, 0.2);
-    let cut = |off: f64| {
-        let mut body = Body::new(Arc::clone(&mesh));
-        let mut positions = rest(&body);
-        positions.iter_mut().flatten().for_each(|x| *x += off);
-        let way = plane(14.3 + off, [3.0 + off, 12.0 + off], 4.0 + off, 30.0 + off);
-        body.cut(&way, 0, &positions).unwrap()
-    };
-    let (near, far) = (cut(0.0), cut(FAR));
-    assert!(!near.elements.is_empty());
-    assert_eq!(near.elements, far.elements);
-    assert!(
-        (near.area_mm2 - far.area_mm2).abs() < 1e-3,
-        "{near:?} {far:?}"
-    );
-}
-
 #[test]
 fn a_plane_through_a_block_makes_two_of_it() {
     let mesh = block([6, 4, 3], 5.0, 0.2);
