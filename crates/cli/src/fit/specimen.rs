@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 use anyhow::{Result, bail};
 use elements::{Law, Material};
-use tissue::axisymmetric::{Axis, Equilibrium, NoEquilibrium, Obstacle, Section, Shape};
+use tissue::axisymmetric::{Axis, Equilibrium, NoEquilibrium, Obstacle, Section, Shape, halved};
 
 /// Shear modulus of the equilibria, Pa.
 pub const SHEAR_PA: f64 = 1000.0;
@@ -229,13 +229,7 @@ impl Ball {
             }
         }
         out.push(length);
-        for _ in 0..halvings {
-            let middles = out
-                .windows(2)
-                .flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]);
-            out = middles.chain(out.last().copied()).collect();
-        }
-        out
+        halved(out, halvings)
     }
 }
 

@@ -6,7 +6,7 @@
 use anyhow::{Context, Result};
 use elements::{Law, Material};
 use std::f64::consts::PI;
-use tissue::axisymmetric::{Axis, Equilibrium, Obstacle, Section as Plane, Shape};
+use tissue::axisymmetric::{Axis, Equilibrium, Obstacle, Section as Plane, Shape, halved};
 
 use super::closed_forms::squeezed_both;
 use super::section::Section;
@@ -45,13 +45,7 @@ fn lines(halvings: usize) -> Vec<f64> {
         }
         out.push(last + cell);
     }
-    for _ in 0..halvings {
-        let middles = out
-            .windows(2)
-            .flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]);
-        out = middles.chain(out.last().copied()).collect();
-    }
-    out
+    halved(out, halvings)
 }
 
 /// Its top at 0, below it the rest; with the nodes of the top.

@@ -14,7 +14,7 @@ mod section;
 
 pub use equilibrium::{Axis, Equilibrium, NoEquilibrium};
 pub use obstacle::{Obstacle, Shape};
-pub use section::Section;
+pub use section::{Section, halved};
 
 #[cfg(test)]
 mod tests;

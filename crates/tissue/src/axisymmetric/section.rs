@@ -68,3 +68,13 @@ impl Section {
         2 * apart.max().unwrap_or(0) + 1
     }
 }
+
+/// Lines in the middle between each two, so many times.
+pub fn halved(mut lines: Vec<f64>, times: usize) -> Vec<f64> {
+    for _ in 0..times {
+        let pairs = lines.windows(2);
+        let both = pairs.flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]);
+        lines = both.chain(lines.last().copied()).collect();
+    }
+    lines
+}
