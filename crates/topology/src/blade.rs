@@ -19,6 +19,7 @@ const ON_BORDER: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Blade {
     /// Fracture energy, J/m², which is mN/mm.
+    /// 0 is a blade that feels nothing.
     pub energy: f64,
     /// With how much it must be pushed before it begins to cut, mN, ...
     pub threshold_mn: f64,
@@ -73,6 +74,7 @@ impl Body {
         blade.check()?;
         self.check(positions)?;
         let has_begun = self.opened.get(&stroke).is_some_and(|own| !own.is_empty());
+        // No error: a blade that rests on tissue presses it, and the contact solves that.
         if !blade.cuts(sweep.way(), has_begun) {
             return Ok(Change::default());
         }
@@ -80,6 +82,8 @@ impl Body {
         let mut opened = Vec::new();
         let mut change = next.cut_in_place(sweep, (stroke, None), positions, &mut opened)?;
         let way = sweep.way();
+        // `G dA / ds` along the way: its direction is `way / |way|` and `ds = |way|`, hence the
+        // square.
         let square = dot(way, way);
         if blade.energy > 0.0 && square > 0.0 {
             for part in opened {

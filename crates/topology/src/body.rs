@@ -10,6 +10,8 @@ use crate::push::Push;
 use crate::{Point, RestMesh, TopologyError};
 
 /// Part of an element, with nodes of its own.
+/// Its forces are those of the whole element's shape on these nodes, times the share: a cut never
+/// makes a shape that is too thin to compute with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// One a corner of the element.
@@ -17,10 +19,12 @@ pub struct Cell {
     /// Strokes that have passed the element, and on whose positive side the cell is.
     pub sides: Vec<(u32, bool)>,
     /// Its material; `None` for the whole element.
+    /// Shared, because operations work on a copy of the body.
     pub polytope: Option<Arc<Polytope>>,
     /// Part of the element's volume.
     pub share: f64,
     /// Fixed points of the element that lie in the cell, and those that have been removed (`remove.rs`).
+    /// One bit for each of 64.
     pub points: u64,
     pub gone: u64,
     /// The part of its material that has not been removed.
@@ -64,6 +68,8 @@ impl Cell {
     }
 
     /// Whether a stroke passes between two cells.
+    /// A stroke that has passed only one of the two parts nothing: the sides of both must be known
+    /// and differ.
     pub fn is_parted_from(&self, other: &Cell) -> bool {
         let parted = |(stroke, positive): &(u32, bool)| other.side_of(*stroke) == Some(!positive);
         self.sides.iter().any(parted)
@@ -90,16 +96,19 @@ pub struct Change {
 pub struct Body {
     mesh: Arc<RestMesh>,
     /// Elements that something has touched; all others are whole cells on the mesh's own nodes.
+    /// In the order of elements, so that sums over them are the same on every machine.
     pub(crate) cells: BTreeMap<u32, Vec<Cell>>,
     /// Of each copy: the mesh node that it stems from.
     pub(crate) parents: Vec<u32>,
     /// Of each stroke: distances from the blade at the nodes that it passed, fixed once used.
+    /// In mm, positive on the positive side of the stroke, and 0 on the blade.
     pub(crate) strokes: BTreeMap<u32, BTreeMap<u32, f64>>,
     /// Of each stroke: the area that it has laid open in each element that it has met, mm².
     pub(crate) opened: BTreeMap<u32, BTreeMap<u32, f64>>,
     /// Factors of stiffness other than 1.
     pub(crate) stiffness: BTreeMap<u32, f32>,
     /// Nodes at most.
+    /// An operation that would need more is an error and changes nothing.
     pub(crate) most_nodes: usize,
 }
 
@@ -255,6 +264,7 @@ impl Body {
         let mut changed = crate::room::copied(elements)?;
         changed.sort_unstable();
         changed.dedup();
+        // All products are looked at before the first is stored.
         let products = changed
             .iter()
             .map(|element| self.stiffness(*element) * factor);

@@ -17,6 +17,7 @@ impl Body {
         if !around.iter().any(|element| self.is_touched(*element)) {
             return push(parts, (node, 1.0));
         }
+        // First the cells that have the place itself; only if there is none, all around it.
         for needs_place in [true, false] {
             for &element in around {
                 let tet = self.mesh().tet(element);
@@ -34,6 +35,7 @@ impl Body {
                 break;
             }
         }
+        // A stable sort, so that the sum of each node is taken in the order of the elements.
         parts.sort_by_key(|part| part.0);
         parts.dedup_by(|next, own| {
             let is_same = next.0 == own.0;

@@ -17,6 +17,8 @@ const LEAST_OVERLAP: f64 = 1e-9;
 
 /// A cell's part of a face of the mesh, in barycentric coordinates of the two later of its nodes, ascending.
 pub(crate) fn on_face(mesh: [u32; 4], cell: &Cell, face: usize) -> Option<Vec<[f64; 2]>> {
+    // Both neighbours order the face's corners by mesh node: so they speak of the same coordinates,
+    // though each has an order of its own.
     let mut corners = FACES[face];
     corners.sort_unstable_by_key(|corner| mesh[*corner]);
     let flat = |at: &Weights| [at[corners[1]], at[corners[2]]];
@@ -28,6 +30,7 @@ pub(crate) fn on_face(mesh: [u32; 4], cell: &Cell, face: usize) -> Option<Vec<[f
             points.iter().map(flat).collect()
         }
     };
+    // `common` clips by edges that have the inside on their left.
     if polygon::double_area(&points) < 0.0 {
         points.reverse();
     }
@@ -42,6 +45,7 @@ pub(crate) fn common(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let way = [to[0] - from[0], to[1] - from[1]];
         rest = polygon::clip(&rest, |point| {
             let value = way[0] * (point[1] - from[1]) - way[1] * (point[0] - from[0]);
+            // Parts of one face often share a whole edge: what rounding puts beside it lies on it.
             if value.abs() < 1e-12 { 0.0 } else { value }
         });
         if rest.len() < 3 {
@@ -55,6 +59,7 @@ pub(crate) fn common(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<[f64; 2]> {
 }
 
 /// Sets that join.
+/// Disjoint sets as a forest (Tarjan 1975): each member names one that is nearer to the root.
 pub(crate) struct Groups(Vec<u32>);
 
 impl Groups {
@@ -64,6 +69,7 @@ impl Groups {
 
     pub fn of(&mut self, mut at: u32) -> u32 {
         while self.0[at as usize] != at {
+            // Path halving: the next search has half as far to go.
             let up = self.0[self.0[at as usize] as usize];
             self.0[at as usize] = up;
             at = up;
@@ -72,6 +78,8 @@ impl Groups {
     }
 
     /// The smaller number stands for both.
+    /// So the number of a set is its smallest member and does not hang on the order of the joins:
+    /// copies of nodes get the same numbers on every machine.
     pub fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.of(a), self.of(b));
         self.0[a.max(b) as usize] = a.min(b);
@@ -90,6 +98,7 @@ impl Body {
         if !cell.is_alive || !other.is_alive || cell.is_parted_from(other) {
             return false;
         }
+        // Two whole elements have the whole face in common.
         if cell.polytope.is_none() && other.polytope.is_none() {
             return true;
         }
@@ -103,7 +112,10 @@ impl Body {
     }
 
     /// Gives each group of joined cells around the nodes of changed elements its own nodes.
+    /// Cells that meet only along an edge or at a point do not hold together. The caller works on a
+    /// copy of the body, which it drops where this fails.
     pub(crate) fn part_nodes(&mut self, change: &mut Change) -> Result<(), TopologyError> {
+        // Around all other mesh nodes the cells are what they were, so nothing parts there.
         let corners = (change.elements.iter()).flat_map(|element| self.mesh().tet(*element));
         let mut nodes = collected(4 * change.elements.len(), corners)?;
         nodes.sort_unstable();
@@ -133,6 +145,8 @@ impl Body {
         Ok(())
     }
 
+    /// One mesh node at a time: of each node that stands for it now, one group of cells keeps the
+    /// number and the others get copies.
     fn part_node(
         &mut self,
         node: u32,
@@ -150,6 +164,8 @@ impl Body {
         for (at, &element) in around.iter().enumerate() {
             let own = self.mesh().tet(element);
             for (face, &over) in self.mesh().neighbours(element).iter().enumerate() {
+                // A face has the number of the corner opposite to it: it has the node unless that
+                // corner is the node.
                 let has_node = own[face] != node;
                 let Ok(other) = around.binary_search(&over) else {
                     continue;
@@ -186,6 +202,8 @@ impl Body {
         let mut renamed: BTreeMap<(u32, u32), u32> = BTreeMap::new();
         let mut parents = Vec::new();
         for (old, all) in had {
+            // The group that has the node's own material keeps the number, and of several the
+            // largest: what a host knows of the node stays with the tissue that lies there.
             let better = |a: &(bool, f64), b: &(bool, f64)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1));
             // Of equals the first stays.
             let keeper = all.iter().rev().max_by(|a, b| better(a.1, b.1));
@@ -199,6 +217,8 @@ impl Body {
         if renamed.is_empty() {
             return Ok(());
         }
+        // Nodes are renamed after all groups are known: `groups` was made of the cells as they
+        // were.
         let mut moved = Vec::new();
         for (at, list) in lists.iter().enumerate() {
             let corner = corner_of(around[at]);

@@ -50,9 +50,14 @@ impl Body {
         let mut change = Change::default();
         let mut fixed = Vec::new();
         let near = self.near(sweep, positions)?;
+        // A blade that goes back within its stroke turns its strip over. Without the sign, nodes
+        // that it passes now would have their distances from the other side, and one cut would have
+        // both signs.
         let turned = self.is_turned(sweep, positions, &near, &distances);
         let sign = if turned { -1.0 } else { 1.0 };
         for element in near {
+            // The cells as they were when the call began: halves that are made here are not met
+            // again.
             let mut cells = self.cells(element).into_owned();
             let mut parted = Vec::with_capacity(2 * cells.len());
             let mut is_touched = false;
@@ -64,6 +69,8 @@ impl Body {
                 let corners = cell.nodes.map(|node| positions[node as usize]);
                 let distance: Weights = std::array::from_fn(|corner| {
                     let node = cell.nodes[corner];
+                    // The first distance of a node stands for the whole stroke: another one now
+                    // would move the cut on faces that have been parted already.
                     (distances.get(&node).copied())
                         .unwrap_or_else(|| sign * self.distance(sweep, node, corners[corner]))
                 });
@@ -86,6 +93,8 @@ impl Body {
                 if met.counts && area > 0.0 {
                     all += whole;
                     let entry = opened.entry(element).or_default();
+                    // All that a stroke opens in an element is at most its whole cut through it,
+                    // however often the strip passes there.
                     let new = area.min(all - *entry).max(0.0);
                     *entry += new;
                     change.area_mm2 += new;
@@ -104,6 +113,8 @@ impl Body {
                     parted.push(cell);
                     continue;
                 }
+                // Distances are fixed at the nodes of touched cells alone. A node that the blade
+                // has only come near may get another one when the stroke goes on.
                 for pair in cell.nodes.into_iter().zip(distance) {
                     push(&mut fixed, pair)?;
                 }
@@ -119,9 +130,12 @@ impl Body {
                 *self.cells_mut(element) = parted;
             }
         }
+        // Only now, so that all elements of this call have read the same distances.
         distances.extend(fixed);
         self.strokes.insert(stroke, distances);
         self.opened.insert(stroke, opened);
+        // Cells first, nodes after: which cells are joined is known only when all of them have been
+        // made.
         self.part_nodes(&mut change)?;
         Ok(change)
     }
@@ -213,11 +227,15 @@ impl Body {
 }
 
 /// How a blade meets a cell.
+/// Polygons are in barycentric coordinates of the element, so they hold however the tissue has been
+/// deformed.
 struct Met {
     /// Where: the polygon of the cut.
     cut: Vec<Weights>,
     /// What becomes of the cell; nothing where the stroke has parted it before.
     cells: Vec<Cell>,
+    /// Whether the area counts here. Both sides of a cut that is there already have the same
+    /// polygon, and only the positive one counts it.
     counts: bool,
 }
 
@@ -225,6 +243,8 @@ struct Met {
 fn meet(cell: &Cell, distance: &Weights, stroke: u32) -> Option<Met> {
     let material = cell.material();
     if let Some(positive) = cell.side_of(stroke) {
+        // The stroke has been here: nothing is parted again. Its cut is still measured, because the
+        // blade may have passed a part of it only.
         let own = |(side, _): &&(Side, Vec<Weights>)| *side == Side::Cut { stroke, positive };
         let face = material.faces.iter().find(own).map(|(_, points)| points);
         let cut = match face {
@@ -243,6 +263,8 @@ fn meet(cell: &Cell, distance: &Weights, stroke: u32) -> Option<Met> {
         if let [Some(above), Some(below)] = parts {
             let whole: f64 = material.share();
             let part = above.share() / whole;
+            // A sliver could not be told from rounding: the cell is not divided, and below it is at
+            // most marked as lying on one side.
             if (LEAST_SHARE..=1.0 - LEAST_SHARE).contains(&(cell.share * part)) {
                 let (_, cut) = above.faces.last()?;
                 let cut = cut.clone();
@@ -252,6 +274,8 @@ fn meet(cell: &Cell, distance: &Weights, stroke: u32) -> Option<Met> {
                 let cells = halves.map(|((positive, part), share)| {
                     let mut half = cell.clone();
                     half.sides.push((stroke, positive));
+                    // What has been removed (`gone`) stays as it was for the whole cell; which of
+                    // these points count for this half is said by its material.
                     half.points = crate::remove::points_in(&part);
                     half.share = share;
                     half.polytope = Some(Arc::new(part));
@@ -269,6 +293,7 @@ fn meet(cell: &Cell, distance: &Weights, stroke: u32) -> Option<Met> {
     }
     // A face of it lies on the blade: the cell is on one side, and is parted from what is on the other.
     let cut = face_on_plane(material, distance)?;
+    // The larger part decides: the smaller one is rounding, or nothing.
     let positive = high > -low;
     let mut marked = cell.clone();
     marked.sides.push((stroke, positive));
@@ -315,6 +340,8 @@ fn higher(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| if a[k] > b[k] { a[k] } else { b[k] })
 }
 
+/// Longest edge of a cell as it is now, mm: what [`Sweep::overlap`] and the margin of a box measure
+/// by.
 fn longest(corners: &[Point; 4]) -> f64 {
     let ends = (0..4).flat_map(|a| (a + 1..4).map(move |b| (a, b)));
     let lengths = ends.map(|(a, b)| length(minus(corners[a], corners[b])));

@@ -122,6 +122,7 @@ impl Body {
 /// What is left of the living cells of an element as parts of its volume. A light cell gets up to [`LEAST_SHARE`] of what it may have left from the
 /// heavy ones: the sum is that of the cells' own.
 pub(crate) fn filled(cells: &[Cell]) -> Vec<f64> {
+    // More than ten cells cannot all have a tenth.
     let least = LEAST_SHARE.min(1.0 / cells.len() as f64);
     let own = |cell: &Cell| match cell.is_alive {
         true => cell.share * cell.kept,
@@ -137,6 +138,7 @@ pub(crate) fn filled(cells: &[Cell]) -> Vec<f64> {
     if raised == 0.0 || spare == 0.0 {
         return cells.iter().map(own).collect();
     }
+    // What is given is what is taken, `given raised = taken spare`, so the volume stays.
     let (given, taken) = ((spare / raised).min(1.0), (raised / spare).min(1.0));
     let fill = |cell| own(cell) + given * lacks(cell) - taken * spares(cell);
     cells.iter().map(fill).collect()

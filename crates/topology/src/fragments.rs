@@ -37,6 +37,7 @@ impl Body {
     pub fn pieces(&self) -> Result<Vec<Fragment>, TopologyError> {
         let mesh = self.mesh();
         let count = mesh.element_count() as u32;
+        // The number of each element's first cell, all cells of the body counted through.
         let mut starts: Vec<u32> = room(count as usize + 1)?;
         starts.push(0);
         for element in 0..count {
@@ -46,6 +47,7 @@ impl Body {
         let mut groups = Groups::new(starts[count as usize] as usize)?;
         for element in 0..count {
             for (face, &over) in mesh.neighbours(element).iter().enumerate() {
+                // Each face between two elements once.
                 if over == OUTSIDE || over < element {
                     continue;
                 }
@@ -63,6 +65,7 @@ impl Body {
                 }
             }
         }
+        // By group: its place among the pieces, and `u32::MAX` before its first living cell.
         let mut place = filled(u32::MAX, starts[count as usize] as usize)?;
         let mut pieces: Vec<Fragment> = Vec::new();
         for element in 0..count {

@@ -46,6 +46,8 @@ impl Body {
             Some(copy) => kept.parents[copy],
             None => node,
         };
+        // A snapshot may have been altered: everything that indexes a list or divides a volume is
+        // checked before any of it is used.
         let is_sound = |element: u32, cell: &Cell| {
             let corners = cell.polytope.iter().flat_map(|own| own.points());
             cell.nodes.iter().all(is_node)

@@ -34,6 +34,8 @@ fn place(at: &Weights) -> Point {
 }
 
 /// A corner of a face, and its normal.
+/// The normal points outward and is as long as the face's area in these coordinates: who needs a
+/// distance divides by it.
 fn plane_of(face: &[Weights]) -> (Point, Point) {
     let corner = place(&face[0]);
     let mut sum = [0.0; 3];
@@ -72,7 +74,11 @@ impl Polytope {
     }
 
     /// Part of the element's volume.
+    /// By the divergence theorem over the faces. The sum is six times the volume in coordinates in
+    /// which the whole element has a sixth: it is the part itself.
     pub fn share(&self) -> f64 {
+        // From a point inside, so that thin parts far from the origin of the coordinates keep their
+        // digits.
         let centre = self.middle();
         let place = |at: &Weights| [at[1] - centre[1], at[2] - centre[2], at[3] - centre[3]];
         let mut sum = 0.0;
@@ -94,6 +100,7 @@ impl Polytope {
     pub fn holds(&self, at: &Weights) -> bool {
         self.faces.iter().all(|(_, points)| {
             let (corner, normal) = plane_of(points);
+            // A point on a face that two parts share is in both.
             dot(normal, minus(place(at), corner)) <= 1e-12
         })
     }
@@ -105,6 +112,7 @@ impl Polytope {
             let length = dot(normal, normal).sqrt();
             match length > 0.0 {
                 true => dot(normal, minus(corner, place(at))) / length,
+                // A face without area has no plane, and bounds nothing.
                 false => f64::MAX,
             }
         };
@@ -114,10 +122,13 @@ impl Polytope {
 
     /// Whether a corner of the element is in it.
     pub fn has_corner(&self, corner: usize) -> bool {
+        // Exact: clipping copies the corners that it keeps and never computes one anew.
         self.points().any(|at| at[corner] == 1.0)
     }
 
     /// The part on one side of a cut; `distance` are its values at the element's corners. `None` where nothing is left.
+    /// Both sides of a cut are made by two calls with the same `distance`; they share its polygon
+    /// corner by corner because [`polygon::between`] gives the same bits to both.
     pub fn part(&self, distance: &Weights, stroke: u32, positive: bool) -> Option<Polytope> {
         let value = value(distance);
         let sign = if positive { 1.0 } else { -1.0 };
@@ -135,6 +146,7 @@ impl Polytope {
                 faces.push((*side, kept));
             }
         }
+        // What is closed has four faces at least, the cut among them.
         if faces.len() < 3 || on_plane.len() < 3 {
             return None;
         }
@@ -180,6 +192,8 @@ fn is_same(a: &Weights, b: &Weights) -> bool {
     (0..4).all(|k| (a[k] - b[k]).abs() < ON_PLANE)
 }
 
+/// Two corners can fall together where the plane goes through a corner; a polygon with both would
+/// have an edge without length.
 fn without_doubles(points: Vec<(Weights, bool)>) -> Vec<Weights> {
     let mut kept: Vec<Weights> = Vec::with_capacity(points.len());
     for (at, _) in points {
@@ -202,6 +216,7 @@ fn around(points: &mut [Weights], distance: &Weights, sign: f64) {
         let off = minus(place(at), centre);
         // Components along axes that need not be of unit length keep the order.
         let along = |axis| dot(off, axis) / dot(axis, axis).sqrt();
+        // By `libm`, as everything in a step: the same order on every platform.
         libm::atan2(along(second), along(first))
     };
     points.sort_by(|a, b| angle(a).total_cmp(&angle(b)));

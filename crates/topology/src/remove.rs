@@ -48,11 +48,15 @@ impl Body {
                 }
             }
         }
+        // The key decides between equal depths, so that the same points go on every machine.
         found.sort_unstable_by(|a, b| (b.depth.total_cmp(&a.depth)).then(a.key().cmp(&b.key())));
+        // All that follows may fail, and works on a copy.
         let mut next = self.clone();
         let mut change = Change::default();
         let mut taken = 0.0;
         for point in found {
+            // Rounded to the nearest number of points: one is taken if at least half of it is
+            // within what may be taken.
             if taken + 0.5 * point.volume > most_mm3 {
                 break;
             }
@@ -61,6 +65,7 @@ impl Body {
             if !cell.is_alive {
                 continue;
             }
+            // At least 1: the point that is taken here is among them.
             let before = cell.points_left();
             cell.gone |= 1 << point.at;
             cell.kept *= f64::from(before - 1) / f64::from(before);
@@ -114,6 +119,8 @@ impl Body {
         change.removed_mm3 = lost.sum();
     }
 
+    /// A body without tissue has no step: whoever removes the last of it gets an error and keeps
+    /// the body.
     fn is_nothing(&self) -> bool {
         let is_dead = |cells: &Vec<Cell>| cells.iter().all(|cell| !cell.is_alive);
         self.cells.len() == self.mesh().element_count() && self.cells.values().all(is_dead)
@@ -170,6 +177,7 @@ fn is_outside([first, rest @ ..]: [u32; 4], positions: &[Point], depths: &[f64])
 }
 
 /// A point to be taken.
+/// Depth in mm, and the volume that the point stands for, mm³.
 struct Inside {
     depth: f64,
     element: u32,
@@ -185,6 +193,7 @@ impl Inside {
 }
 
 /// Which of the fixed points lie in a polytope; the one nearest to its middle where it holds none.
+/// A part that holds none would weigh something and have nothing that could be removed.
 pub(crate) fn points_in(polytope: &Polytope) -> u64 {
     let mut mask = 0;
     for (at, point) in points().iter().enumerate() {
@@ -200,6 +209,7 @@ pub(crate) fn points_in(polytope: &Polytope) -> u64 {
 }
 
 /// 64 points of a tetrahedron, evenly: the middles of its 64 parts by halving edges twice.
+/// They are 64 because the points of a cell are the bits of a `u64`.
 fn points() -> &'static [Weights; 64] {
     static POINTS: OnceLock<[Weights; 64]> = OnceLock::new();
     POINTS.get_or_init(|| {

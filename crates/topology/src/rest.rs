@@ -11,6 +11,7 @@ pub const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 pub const OUTSIDE: u32 = u32::MAX;
 
 /// Rest positions, tetrahedra, and what follows from them.
+/// It never changes: bodies that are cut share one and keep what differs from it.
 #[derive(Clone, Debug)]
 pub struct RestMesh {
     positions: Vec<[f32; 3]>,
@@ -55,6 +56,7 @@ impl RestMesh {
         for node in tets.iter().flatten() {
             starts[*node as usize + 1] += 1;
         }
+        // Counts become starts: lists of all nodes lie one behind the other in `around`.
         for node in 0..count {
             starts[node + 1] += starts[node];
         }
@@ -146,6 +148,7 @@ impl RestMesh {
             let [b, c, d] = [b, c, d].map(|corner| minus(corner, a));
             let rows = [cross(c, d), cross(d, b), cross(b, c)];
             let square: f64 = rows.iter().map(|row| dot(*row, *row)).sum();
+            // A little more than the norm: rounding to f32 must not take it below.
             (1.0001 * square.sqrt() / dot(b, rows[0])) as f32
         };
         let made = collected(self.tets.len(), self.tets.iter().map(of))?;
@@ -153,6 +156,8 @@ impl RestMesh {
     }
 
     /// Mean length of the edges at a node, mm.
+    /// An edge counts once for each element that has it. The node itself is among the ends, at
+    /// distance 0, hence three edges an element.
     pub fn edge_length(&self, node: u32) -> f64 {
         let own = self.position(node);
         let around = self.around(node);
@@ -184,6 +189,8 @@ fn neighbours(tets: &[[u32; 4]]) -> Result<Vec<[u32; 4]>, TopologyError> {
             faces.push((nodes, element as u32, face));
         }
     }
+    // Both elements of an inner face list it with the same sorted nodes, so they stand side by side
+    // now.
     faces.sort_unstable();
     let mut found = filled([OUTSIDE; 4], tets.len())?;
     for pair in faces.windows(2) {

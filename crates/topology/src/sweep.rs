@@ -11,6 +11,7 @@ const LEAST_AREA: f64 = 1e-9;
 const NEAR: f64 = 0.35;
 
 /// Triangles `[p, q, r]`, mm, turned the same way.
+/// A blade that stands still sweeps nothing, which is an error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
     triangles: Vec<[Point; 3]>,
@@ -81,6 +82,7 @@ impl Sweep {
 
     /// Distance of a point from the plane of the triangle nearest to it, mm; positive on one side of the strip. Beyond the strip the
     /// plane goes on.
+    /// Inside of an element the distance counts as linear between those of its corners.
     pub fn distance(&self, point: Point) -> f64 {
         let mut nearest = (f64::MAX, 0.0f64);
         for triangle in &self.triangles {
@@ -102,6 +104,8 @@ impl Sweep {
             let [a, b, c] = *triangle;
             let normal = cross(minus(b, a), minus(c, a));
             let mut clipped = points.to_vec();
+            // Clipped by the planes through the triangle's edges and across it: what is left is
+            // what the triangle passes, with the polygon's own area and not that of its shadow.
             for [from, to] in [[a, b], [b, c], [c, a]] {
                 let inward = cross(normal, minus(to, from));
                 clipped = polygon::clip(&clipped, |point| dot(inward, minus(*point, from)));

@@ -14,6 +14,8 @@ use crate::{Point, Sweep, TopologyError};
 const WIDE: f64 = 0.6;
 
 /// A cell that is to part.
+/// It names its cell by element and nodes and not by a place in a list, because earlier tears of
+/// the same call may have divided the element.
 struct Torn {
     stretch: f64,
     element: u32,
@@ -40,12 +42,15 @@ impl Body {
         }
         self.check(positions)?;
         let mut torn = self.stretched(stretch, stroke, positions)?;
+        // Element and nodes decide between equal stretches: an order without ties gives the same
+        // tears everywhere.
         torn.sort_unstable_by(|a, b| {
             b.stretch
                 .total_cmp(&a.stretch)
                 .then((a.element, a.nodes).cmp(&(b.element, b.nodes)))
         });
         let (mut next, mut change) = (self.clone(), Change::default());
+        // Positions with the copies that earlier tears of this call have made.
         let mut places = crate::room::copied(positions)?;
         let mut left = most;
         for one in torn {
@@ -64,6 +69,7 @@ impl Body {
                 &places,
                 &mut Vec::new(),
             )?;
+            // A copy begins where its source is: a tear moves nothing.
             for &copied in &own.copied {
                 let place = places[copied as usize];
                 push(&mut places, place)?;
@@ -72,6 +78,7 @@ impl Body {
             for element in own.elements {
                 push(&mut change.elements, element)?;
             }
+            // A tear that has opened nothing does not count.
             left -= usize::from(own.area_mm2 > 0.0);
             change.area_mm2 += own.area_mm2;
         }
@@ -91,6 +98,9 @@ impl Body {
         let gradients = self.mesh().gradients()?;
         let mut found = Vec::new();
         // What an element's corners have moved against each other bounds its stretch, and ends the look at most of them.
+        // With `F = I + D E^-1`, `D` the differences of displacements and `E` the edges at rest, no
+        // stretch is above `1 + |D| |E^-1|` in Frobenius norms; the second factor is of the rest
+        // shape alone.
         let may_be = |element: u32, nodes: [u32; 4]| {
             let rest = self.mesh().tet(element);
             let moved =
@@ -151,6 +161,7 @@ fn largest_stretch(rest: [Point; 4], now: [Point; 4], least: f64) -> Option<(f64
     if bound.fold(0.0, f64::max) <= least * least {
         return None;
     }
+    // Costly beside the bounds, and reached by few cells.
     let eigen = c.symmetric_eigen();
     let place = eigen.eigenvalues.imax();
     let stretch = eigen.eigenvalues[place].sqrt();
@@ -164,6 +175,7 @@ fn across(corners: &[Point; 4], along: Point) -> Result<Sweep, TopologyError> {
     let least = [0, 1, 2]
         .into_iter()
         .min_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs()));
+    // The axis that the direction has least of: the cross product with it cannot vanish.
     let mut axis = [0.0; 3];
     axis[least.unwrap_or(0)] = 1.0;
     let side = cross(along, axis);

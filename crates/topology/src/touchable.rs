@@ -118,7 +118,10 @@ impl Body {
             let order = a.0.cmp(&b.0).then(b.1.total_cmp(&a.1));
             order.then(a.2.cmp(&b.2))
         });
+        // Sorted by kind first, so walls are what is left at the end.
         let first_wall = rated.partition_point(|rated| !rated.0.1);
+        // By vertex of the skin: its number among the corners that are kept, [`NONE`] until a piece
+        // asks for it.
         let mut places = room(skin.vertices.len())?;
         places.resize(skin.vertices.len(), NONE);
         let (mut corners, mut pieces) = (Vec::new(), room(rated.len())?);
@@ -143,6 +146,7 @@ impl Body {
     }
 
     /// Where a vertex is in the intact body.
+    /// A copy of a node lies where its mesh node does, so both lips of a cut have the same place.
     fn rest_of(&self, vertex: &Vertex) -> crate::Point {
         let mut at = [0.0; 3];
         for (node, weight) in vertex.nodes.into_iter().zip(vertex.weights) {

@@ -20,6 +20,7 @@ impl Surface {
             let nodes = self.vertices[*corner as usize].nodes;
             used.entry(nodes).or_default().insert(*corner);
         }
+        // Before edges are split: the faces that this adds have edges with corners, too.
         let split = self.touched_border(body, &used, pieces)?;
         for piece in pieces {
             let mut corners = Vec::with_capacity(piece.corners.len());
@@ -34,6 +35,8 @@ impl Surface {
     }
 
     /// Untouched elements' faces at the border with a corner on an edge.
+    /// A cut that ends on such an edge puts a corner there. The whole face beside it would leave a
+    /// gap as soon as that corner moves, so it becomes a piece, too, and gets the corner.
     fn touched_border(
         &self,
         body: &Body,
@@ -72,12 +75,16 @@ impl Surface {
     }
 
     /// Corners strictly between two, in order.
+    /// A corner on the line between two lies on nodes of theirs alone. So all sets of those nodes
+    /// are looked up, in place of a search through all corners.
     fn between(&self, a: u32, b: u32, used: &BTreeMap<[u32; 4], BTreeSet<u32>>) -> Vec<u32> {
         let mut nodes: Vec<u32> = [a, b]
             .iter()
             .flat_map(|corner| self.vertices[*corner as usize].nodes)
             .filter(|node| *node != NONE)
             .collect();
+        // The corners of a piece are of one cell: these are four nodes at most, and at most fifteen
+        // sets.
         nodes.sort_unstable();
         nodes.dedup();
         let weights = |corner: u32| -> Vec<f64> {
@@ -107,6 +114,8 @@ impl Surface {
                     .collect();
                 let part = off.iter().zip(&way).map(|(o, w)| o * w).sum::<f64>() / square;
                 let beside = off.iter().zip(&way).map(|(o, w)| (o - part * w).abs());
+                // `part` is where its foot lies between the two, `beside` how far it is off, both
+                // in weights.
                 if beside.fold(0.0, f64::max) < 2.0 * SAME && part > 0.0 && part < 1.0 {
                     found.push((part, corner));
                 }

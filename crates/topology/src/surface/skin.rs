@@ -30,6 +30,8 @@ impl Body {
     /// # Errors
     /// No memory.
     pub fn skin(&self) -> Result<Skin, TopologyError> {
+        // A surface without the mesh's own border: `pieces` makes what is at touched elements, and
+        // here no slots are kept from before.
         let mut surface = Surface {
             vertices: Vec::new(),
             triangles: Vec::new(),
