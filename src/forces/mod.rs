@@ -67,6 +67,7 @@ impl ReactionForces {
         let elements = touched().map(|(index, &corners)| {
             let rest = corners.map(|node| body.positions[node as usize].map(f64::from));
             Tetrahedron::new(corners, rest, f64::from(body.stiffness_of(index)))
+                .along(body.laws.fibre_of(index))
         });
         let elements = memory::collected(touched().count(), elements, WHAT)?;
         let numbers = touched().map(|(index, _)| body.laws.number_of(index));

@@ -33,6 +33,7 @@ class Mesh:
     metadata: dict = field(default_factory=dict)
     stiffness: np.ndarray = field(default_factory=lambda: np.zeros(0, np.float32))
     region: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
+    fibre: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.float32))
 
     @property
     def node_count(self) -> int:
@@ -40,13 +41,14 @@ class Mesh:
 
     @property
     def sha256(self) -> str:
-        """The mesh hash: SHA-256 of positions, tets, fixed, supported and, if any, stiffness, region and laws."""
+        """The mesh hash: SHA-256 of positions, tets, fixed, supported and, if any, stiffness, region and laws, and fibre."""
         digest = hashlib.sha256()
         for array in (self.positions, self.tets, self.fixed, self.supported, self.stiffness):
             digest.update(np.ascontiguousarray(array).tobytes())
         if len(self.region):
             digest.update(np.ascontiguousarray(self.region).tobytes())
             digest.update(self.metadata.get("laws", "").encode())
+        digest.update(np.ascontiguousarray(self.fibre).tobytes())
         return digest.hexdigest()
 
     def density(self, own: float) -> np.ndarray:
@@ -91,6 +93,8 @@ class Mesh:
             tensors["stiffness"] = np.ascontiguousarray(self.stiffness, np.float32)
         if len(self.region):
             tensors["region"] = np.ascontiguousarray(self.region, np.int32)
+        if len(self.fibre):
+            tensors["fibre"] = np.ascontiguousarray(self.fibre, np.float32)
         save_file(tensors, str(path), metadata={k: str(v) for k, v in metadata.items()})
         Path(path).chmod(0o644)
 
@@ -111,9 +115,10 @@ def load_mesh(path: Path | str) -> Mesh:
             get = {n: file.get_tensor(n) if n in names else empty for n in _TENSORS}
             stiffness = file.get_tensor("stiffness") if "stiffness" in names else np.zeros(0, np.float32)
             region = file.get_tensor("region") if "region" in names else empty
+            fibre = file.get_tensor("fibre") if "fibre" in names else np.zeros((0, 3), np.float32)
     except SafetensorError as error:
         raise InputError(f"{path}: not a readable safetensors file ({error}); make the mesh again") from error
-    mesh = Mesh(**get, stiffness=stiffness, region=region, metadata=metadata)
+    mesh = Mesh(**get, stiffness=stiffness, region=region, fibre=fibre, metadata=metadata)
     if not np.isfinite(mesh.positions).all():
         node = int(np.argwhere(~np.isfinite(mesh.positions))[0, 0])
         raise InputError(f"{path}: positions of node {node} are not finite")
@@ -124,6 +129,8 @@ def load_mesh(path: Path | str) -> Mesh:
         raise InputError(
             f"{path}: region must hold 0 to {len(laws)}, the number of laws, for each of the {len(mesh.tets)} tets"
         )
+    if len(fibre) and fibre.shape != (len(mesh.tets), 3):
+        raise InputError(f"{path}: fibre must hold a unit vector, or zeros, for each of the {len(mesh.tets)} tets")
     for name in ("tets", "surface", "fixed", "supported"):
         array = getattr(mesh, name)
         if array.size and (array.min() < 0 or array.max() >= mesh.node_count):

@@ -45,6 +45,7 @@ impl Mesh {
         let mut tets = memory::room(4 * most, WHAT)?;
         let mut stiffness = memory::room(most, WHAT)?;
         let mut region = memory::room(most, WHAT)?;
+        let mut fibre = memory::room(if self.fibre.is_empty() { 0 } else { most }, WHAT)?;
         let ends = gone.iter().map(|element| *element as usize);
         let mut start = 0;
         for end in ends.chain([self.tets.len() / 4]) {
@@ -54,12 +55,14 @@ impl Mesh {
                 false => stiffness.extend_from_slice(&self.stiffness[start..end]),
             }
             region.extend(self.region.iter().take(end).skip(start));
+            fibre.extend(self.fibre.iter().take(end).skip(start));
             start = end + 1;
         }
         for element in new {
             tets.extend(element.nodes);
             stiffness.push(self.stiffness_of(element));
             region.extend(self.region.get(element.parent as usize));
+            fibre.extend(self.fibre.get(element.parent as usize));
         }
         let skin = body.skin()?;
         let touchable = body.touchable_of(self.domain_sides(body)?, &skin)?;
@@ -98,6 +101,7 @@ impl Mesh {
             stiffness,
             region,
             laws: memory::collected(self.laws.len(), self.laws.iter().cloned(), WHAT)?,
+            fibre,
             surface_faces: memory::copied(&self.surface_faces, WHAT)?,
             domain_nodes,
             domain_faces,

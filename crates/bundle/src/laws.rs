@@ -1,4 +1,4 @@
-//! Regions of a body with a law of their own: `region` and the text `laws` of a mesh file, `laws` of the manifest.
+//! Regions of a body with a law of their own: `region`, `fibre` and the text `laws` of a mesh file, `laws` of the manifest.
 
 use elements::{Laws, MaterialError, Region};
 
@@ -6,8 +6,11 @@ use super::tensors::TensorFile;
 use field::error::{Error, Result};
 use field::memory;
 
-/// Numbers of the laws of a mesh's tetrahedra, and the regions.
-pub(super) fn read(file: &TensorFile, tets: usize) -> Result<(Vec<u8>, Vec<Region>)> {
+/// See [`read`].
+type Own = (Vec<u8>, Vec<Region>, Vec<[f32; 3]>);
+
+/// Numbers of the laws of a mesh's tetrahedra, the regions, and directions of fibres.
+pub(super) fn read(file: &TensorFile, tets: usize) -> Result<Own> {
     let regions: Vec<Region> = match file.text().get("laws") {
         Some(text) => Region::list(text).map_err(|error| {
             let problem = format!("metadata `laws` is no list of regions: {error}");
@@ -23,13 +26,21 @@ pub(super) fn read(file: &TensorFile, tets: usize) -> Result<(Vec<u8>, Vec<Regio
         }
         false => Vec::new(),
     };
+    let fibre = match file.has("fibre") {
+        true => {
+            let values = file.f32("fibre", &[Some(tets), Some(3)])?;
+            memory::copied(values.as_chunks().0, "a mesh")?
+        }
+        false => Vec::new(),
+    };
     let laws = Laws {
         of_tet: &of_tet,
         regions: &regions,
+        fibre: &fibre,
     };
     laws.check(tets)
         .map_err(|error| fault(file.name(), &error))?;
-    Ok((of_tet, regions))
+    Ok((of_tet, regions, fibre))
 }
 
 /// A fault of a file's laws.

@@ -29,6 +29,8 @@ pub struct Mesh {
     pub region: Vec<u8>,
     /// Regions with a law of their own.
     pub laws: Vec<elements::Region>,
+    /// Directions of the tetrahedra's fibres at rest `[T]`, unit vectors or zero; empty where the body has none.
+    pub fibre: Vec<[f32; 3]>,
     /// Boundary triangles `[F,3]`, outward.
     pub surface_faces: Vec<u32>,
     /// Triangles of the domain `[D,3]`; of a cut body those that are whole.
@@ -119,7 +121,7 @@ impl Mesh {
             let problem = format!("element {tet} is {}, must be positive", stiffness[tet]);
             return Err(file.bad("stiffness", problem));
         }
-        let (region, laws) = super::laws::read(file, tets.len() / 4)?;
+        let (region, laws, fibre) = super::laws::read(file, tets.len() / 4)?;
         let surface_faces = file.indices("surface", &[None, Some(3)], count)?;
         let domain = if file.has("domain") {
             file.indices("domain", &[None], surface_faces.len() / 3)?
@@ -156,6 +158,9 @@ impl Mesh {
             hash.update(file.raw("region", Dtype::I32, &[None])?);
             hash.update(text.get("laws").map_or("", String::as_str));
         }
+        if file.has("fibre") {
+            hash.update(file.raw("fibre", Dtype::F32, &[None, Some(3)])?);
+        }
         let mut held_nodes = fixed;
         if boundary == Boundary::Supported {
             memory::reserve(&mut held_nodes, supported.len(), WHAT)?;
@@ -171,6 +176,7 @@ impl Mesh {
             stiffness,
             region,
             laws,
+            fibre,
             surface_faces,
             domain_faces,
             sha256: hex(&hash.finalize()),
@@ -189,6 +195,7 @@ impl Mesh {
             laws: elements::Laws {
                 of_tet: &self.region,
                 regions: &self.laws,
+                fibre: &self.fibre,
             },
         }
     }

@@ -9,7 +9,7 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use elements::{Law, Relaxation};
 use host::Effort;
-use make::{Choice, Fixed, Gravity, Made, gravity};
+use make::{Choice, Fibre, Fixed, Gravity, Made, gravity};
 use serde_json::json;
 use tissue::mesh::Boundary;
 use tissue::mesh_import::Region;
@@ -96,11 +96,16 @@ pub struct Options {
     /// Region that --material gives a law: a name, `=` and a region as of --fixed. May be repeated; regions of one name are one.
     #[arg(long, value_name = "NAME=REGION", allow_hyphen_values = true)]
     region: Vec<Fixed>,
+    /// Direction of the fibres of a region that --region, the mesh file or a group names, or of the whole body: any length but 0. For laws with +fibres. Other
+    /// directions than one a region come in the field `fibre` of a mesh file. May be repeated; the last one counts.
+    #[arg(long, value_name = "[NAME=]X,Y,Z", allow_hyphen_values = true)]
+    fibre: Vec<Fibre>,
     /// Young's modulus, Pa; overrides the material's. A law with a modulus of its own sets it.
     #[arg(long)]
     young: Option<f64>,
     /// Law of the tissue: neo-hookean, mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain), yeoh:C2/C1[,C3/C1] as
-    /// numbers, veronda-westmann:BETA, ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
+    /// numbers, veronda-westmann:BETA, ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it, or a tissue that `upt materials` lists. Behind any of
+    /// them +fibres:K1/MU,K2 adds fibres, whose directions come by --fibre or in the mesh file; fibres:K1/MU,K2 alone has them in neo-hookean.
     #[arg(long, default_value = "neo-hookean", value_parser = materials::law)]
     law: Law,
     /// Relaxation of the stress without change of volume: SHARE,TAU_S[,SHARE,TAU_S...], each share lost with its time constant, s, or a tissue that
@@ -203,6 +208,7 @@ impl Options {
             tool_scale: self.sizes.tool_scale,
             material: self.material.clone(),
             region: self.region.clone(),
+            fibre: self.fibre.clone(),
             young: self.young,
             law: self.law,
             law_source: materials::source_of(&self.law),

@@ -111,7 +111,8 @@ pub struct SolverArguments {
     #[arg(long)]
     young: Option<f64>,
     /// Law of the tissue: neo-hookean, mooney-rivlin:SHARE with the share of C01 in C10 + C01 (default: 0.526, brain), yeoh:C2/C1[,C3/C1] as
-    /// numbers, veronda-westmann:BETA, ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it, or a tissue that `upt materials` lists.
+    /// numbers, veronda-westmann:BETA, ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it, or a tissue that `upt materials` lists. Behind any of
+    /// them +fibres:K1/MU,K2 adds fibres, whose directions are in the mesh file; fibres:K1/MU,K2 alone has them in neo-hookean.
     #[arg(long, default_value = "neo-hookean", value_parser = materials::law)]
     law: elements::Law,
     /// Relaxation of the stress without change of volume: SHARE,TAU_S[,SHARE,TAU_S...], each share lost with its time constant, s, or a tissue that

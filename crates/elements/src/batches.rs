@@ -1,6 +1,7 @@
 //! Clusters packed into batches of 16, with the constants of their tetrahedra.
 
 use crate::cluster::{Cluster, Group, corners};
+use crate::directions::Directions;
 use crate::gradients::Gradients;
 use crate::material::Material;
 use crate::room::{collected, grow, push, room};
@@ -19,6 +20,8 @@ pub struct Kind<const NODES: usize, const TETS: usize> {
     pub batches: Vec<Cluster<NODES, TETS>>,
     /// A row a batch where a law of the body takes displacements or the material relaxes, else none.
     pub gradients: Vec<Gradients<TETS>>,
+    /// A row a batch where a law of the body has fibres, else none.
+    pub directions: Vec<Directions<TETS>>,
     /// Mesh elements of each batch; [`PADDING`] in padding lanes.
     pub elements: Vec<[[u32; WIDTH]; TETS]>,
 }
@@ -31,6 +34,8 @@ pub struct Element {
     pub slots: [u16; 4],
     /// See `Cluster::bulk`.
     pub bulk: f32,
+    /// Direction of its fibres at rest; zero where it has none.
+    pub fibre: [f32; 3],
 }
 
 /// What the constants of a chunk's clusters are made from.
@@ -42,6 +47,8 @@ pub struct Source<'a> {
     pub material: &'a Material,
     /// Whether gradients are asked for.
     pub gradients: bool,
+    /// Whether directions of fibres are.
+    pub directions: bool,
 }
 
 impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
@@ -62,12 +69,16 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         if source.gradients {
             grow(&mut self.gradients, ends.len())?;
         }
+        if source.directions {
+            grow(&mut self.directions, ends.len())?;
+        }
         let starts = std::iter::once(0).chain(ends.iter().copied());
         for (first, end) in starts.zip(&ends) {
             let groups = &groups[first..*end];
             let mut batch = Cluster::EMPTY;
             let mut elements = [[PADDING; WIDTH]; TETS];
             let mut gradients = Gradients::EMPTY;
+            let mut directions = Directions::EMPTY;
             for lane in 0..WIDTH {
                 // Beyond the last group its shape alone, without stiffness.
                 let group = groups[lane.min(groups.len() - 1)];
@@ -88,6 +99,10 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                     }
                     let stiffness = f64::from(source.mesh.stiffness_of(element as usize));
                     gradients.set(tet, lane, gradient, volume.abs() * stiffness);
+                    if source.directions {
+                        let own = source.mesh.laws.fibre_of(element as usize);
+                        directions.set((tet, lane), gradient, own, volume.abs() * stiffness);
+                    }
                     // The order of the corners in a group may turn the element around.
                     let factor = -source.material.shear_pa() * volume.abs() * stiffness;
                     for (row, [j, k]) in batch.springs[tet].iter_mut().zip(PAIRS) {
@@ -101,6 +116,9 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
             self.batches.push(batch);
             if source.gradients {
                 self.gradients.push(gradients);
+            }
+            if source.directions {
+                self.directions.push(directions);
             }
             self.elements.push(elements);
         }
@@ -126,8 +144,14 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                         slots[c][lane],
                     ],
                     bulk: cluster.bulk[tet][lane],
+                    fibre: (self.directions.get(batch)).map_or([0.0; 3], |own| own.of(tet, lane)),
                 }
             })
+    }
+
+    /// Directions of the fibres of some batches; empty where there are none.
+    pub fn directions_of(&self, batches: &Range<usize>) -> &[Directions<TETS>] {
+        self.directions.get(batches.clone()).unwrap_or_default()
     }
 
     /// Takes one cluster of another body's batches, with other slots, into the lane behind the `used` lanes of the last batch; returns how many are
@@ -149,6 +173,9 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
             if !from.gradients.is_empty() {
                 push(&mut self.gradients, Gradients::EMPTY)?;
             }
+            if !from.directions.is_empty() {
+                push(&mut self.directions, Directions::EMPTY)?;
+            }
         }
         if let (Some(own), Some(elements)) = (self.batches.last_mut(), self.elements.last_mut()) {
             let source = &from.batches[batch];
@@ -163,6 +190,9 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         if let Some(own) = self.gradients.last_mut() {
             own.copy_lane(&from.gradients[batch], lane, at);
         }
+        if let Some(own) = self.directions.last_mut() {
+            own.copy_lane(&from.directions[batch], lane, at);
+        }
         Ok(at + 1)
     }
 
@@ -176,6 +206,9 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
             if let Some(gradients) = self.gradients.last_mut() {
                 gradients.repeat_lane(used - 1, lane);
             }
+            if let Some(directions) = self.directions.last_mut() {
+                directions.clear_lane(lane);
+            }
         }
     }
 
@@ -183,6 +216,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
     pub fn clear(&mut self) {
         self.batches.clear();
         self.gradients.clear();
+        self.directions.clear();
         self.elements.clear();
     }
 
@@ -194,7 +228,9 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
 
     /// Bytes of the batches.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.batches.as_slice()) + size_of_val(self.gradients.as_slice())
+        size_of_val(self.batches.as_slice())
+            + size_of_val(self.gradients.as_slice())
+            + size_of_val(self.directions.as_slice())
     }
 }
 

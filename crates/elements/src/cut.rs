@@ -23,6 +23,8 @@ pub struct CutTetrahedra<'a> {
     pub tets: &'a [[u32; 4]],
     /// Stiffness of the intact body's elements over the material's `[T]`; empty where it is uniform.
     pub stiffness: &'a [f32],
+    /// Directions of the fibres of the intact body's elements `[T]`; empty where it has none. What has become of an element has its direction.
+    pub fibre: &'a [[f32; 3]],
     /// Elements of the intact body that are there no more, ascending.
     pub changed: &'a [u32],
     /// What is there in their place: the place in `changed`, corners, stiffness over the material's; ascending. The number of the `i`-th is `T + i`.
@@ -34,6 +36,7 @@ struct Packed {
     number: u32,
     corners: [u32; 4],
     stiffness: f32,
+    fibre: [f32; 3],
 }
 
 impl ElementForces {
@@ -51,6 +54,7 @@ impl ElementForces {
         for &element in cut.changed {
             is_changed[element as usize] = true;
         }
+        let fibre_of = |number: u32| cut.fibre.get(number as usize).copied().unwrap_or_default();
         let base = partition.chunks.len();
         let mut parents = Vec::new();
         // The chunk of each changed element, by its place in `changed`.
@@ -81,6 +85,7 @@ impl ElementForces {
                             number,
                             corners: cut.tets[number as usize],
                             stiffness: cut.stiffness.get(number as usize).copied().unwrap_or(1.0),
+                            fibre: fibre_of(number),
                         },
                     )?,
                 }
@@ -93,6 +98,7 @@ impl ElementForces {
                 number,
                 corners,
                 stiffness,
+                fibre: fibre_of(cut.changed[place as usize]),
             };
             push(&mut packed[chunk_of[place as usize]], own)?;
         }
@@ -147,6 +153,7 @@ impl Partition {
     ) -> Result<(), TryReserveError> {
         let tets = collected(elements.iter().map(|element| element.corners))?;
         let stiffness = collected(elements.iter().map(|element| element.stiffness))?;
+        let fibre = collected(elements.iter().map(|element| element.fibre))?;
         let leaf = collected(0..elements.len() as u32)?;
         let mut fresh = room(4 * tets.len())?;
         let owners = &self.slot_of_node;
@@ -156,7 +163,10 @@ impl Partition {
             positions,
             tets: &tets,
             stiffness: &stiffness,
-            laws: Laws::default(),
+            laws: Laws {
+                fibre: &fibre,
+                ..Laws::default()
+            },
         };
         self.push_chunk(
             (&leaf, law),
@@ -180,6 +190,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         Ok(Kind {
             batches: copied_with_room(&self.batches)?,
             gradients: copied_with_room(&self.gradients)?,
+            directions: copied_with_room(&self.directions)?,
             elements: copied_with_room(&self.elements)?,
         })
     }
@@ -238,6 +249,9 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                 if let (Some(own), Some(source)) = (self.gradients.get_mut(batch), &gradients) {
                     own.copy_lane(source, from.1, lane);
                     own.volume.iter_mut().for_each(|row| row[lane] = 0.0);
+                }
+                if let Some(own) = self.directions.get_mut(batch) {
+                    own.clear_lane(lane);
                 }
             }
         }

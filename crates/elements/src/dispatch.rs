@@ -5,8 +5,9 @@
 )]
 
 use crate::kernel::{
-    Eigenvalues, LaneTerms, SecondLoop, Seconds, Shape, Strain, add_forces,
-    add_forces_of_stretches, add_volumes, add_volumes_of_stretches, by_eigenvalues, relax,
+    Eigenvalues, LaneFibres, LaneTerms, SecondLoop, Seconds, Shape, Strain, add_forces,
+    add_forces_of_fibres, add_forces_of_stretches, add_volumes, add_volumes_of_stretches,
+    by_eigenvalues, relax,
 };
 use crate::laws::Law;
 use crate::partition::{Chunk, Partition};
@@ -45,13 +46,39 @@ unsafe fn all_forces<L: Eigenvalues>(
 ) -> f32 {
     unsafe {
         let law = partition.moduli_of(chunk).law;
-        match (law, Seconds::of(law)) {
+        let matrix = law.matrix();
+        let smallest = match (matrix, Seconds::of(matrix)) {
             (_, Some(laws)) => forces_by::<L, _>(laws, partition, chunk, nodes, forces, averaged),
             (Law::NeoHookean(law), None) => {
                 forces_by::<L, _>(law, partition, chunk, nodes, forces, averaged)
             }
             (_, None) => forces_by_stretches::<L>(partition, chunk, nodes, forces, averaged),
+        };
+        if let Some(fibres) = law.fibres() {
+            let fibres = LaneFibres::new(fibres, partition.moduli.shear_pa);
+            forces_of_fibres::<L>(&fibres, partition, chunk, nodes, forces);
         }
+        smallest
+    }
+}
+
+/// Adds what the fibres of a chunk pull with.
+#[inline(always)]
+unsafe fn forces_of_fibres<L: NodeLanes>(
+    fibres: &LaneFibres,
+    partition: &Partition,
+    chunk: &Chunk,
+    nodes: *const [f32; 4],
+    forces: *mut [f32; 4],
+) {
+    unsafe {
+        let from_positions = !partition.moduli_of(chunk).law.takes_displacements();
+        let (octahedra, pairs, singles) = partition.clusters(chunk);
+        let (a, b, c) = partition.directions(chunk);
+        let (octahedra, pairs, singles) = ((octahedra, a), (pairs, b), (singles, c));
+        add_forces_of_fibres::<L, 6, 4>(fibres, from_positions, octahedra, nodes, forces);
+        add_forces_of_fibres::<L, 5, 2>(fibres, from_positions, pairs, nodes, forces);
+        add_forces_of_fibres::<L, 4, 1>(fibres, from_positions, singles, nodes, forces);
     }
 }
 
@@ -138,14 +165,18 @@ unsafe fn all_histories<L: Eigenvalues>(
     unsafe {
         let moduli = partition.moduli_of(chunk);
         let shear = moduli.shear_pa * step.stiffer;
-        let law = &LaneTerms::new(&moduli.law, [shear, moduli.bulk_pa]);
+        let terms = LaneTerms::new(&moduli.law, [shear, moduli.bulk_pa]);
+        let fibres = moduli.law.fibres();
+        let fibres = fibres.map(|own| LaneFibres::new(own, shear));
+        let law = (&terms, fibres.as_ref());
         let (octahedra, pairs, singles) = partition.clusters(chunk);
         let (a, b, c) = partition.gradients(chunk);
+        let (d, e, f) = partition.directions(chunk);
         let batch = (step.count + 1) * SIX * WIDTH;
         let of_octahedra = of_octahedra.add(chunk.octahedra.start * 4 * batch);
         let of_pairs = of_pairs.add(chunk.pairs.start * 2 * batch);
         let of_singles = of_singles.add(chunk.singles.start * batch);
-        let (octahedra, pairs, singles) = ((octahedra, a), (pairs, b), (singles, c));
+        let (octahedra, pairs, singles) = ((octahedra, a, d), (pairs, b, e), (singles, c, f));
         if forces[1].is_null() {
             relax::<L, 6, 4, 1>(law, step, octahedra, of_octahedra, nodes, forces);
             relax::<L, 5, 2, 1>(law, step, pairs, of_pairs, nodes, forces);

@@ -26,6 +26,7 @@
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
 )]
 
+mod fibres;
 mod forces;
 mod gradients;
 mod grown;
@@ -36,6 +37,7 @@ mod stretches;
 
 use crate::cluster::{Cluster, corners};
 use crate::laws::{Isochoric, Law};
+pub use fibres::{LaneFibres, add_forces_of_fibres};
 use forces::scatter;
 pub use gradients::{add_forces_of_stretches, add_volumes_of_stretches};
 use lanes::{NodeLanes, WIDTH, prefetch};
@@ -53,6 +55,7 @@ pub fn flops(nodes: usize, tets: usize, law: &Law) -> usize {
         Law::Ogden(law) => flops_of_stretches(law.terms.len(), nodes, tets),
         Law::Yeoh(law) => flops_of(*law, nodes, tets),
         Law::VerondaWestmann(law) => flops_of(*law, nodes, tets),
+        Law::Fibred(own) => flops(nodes, tets, &own.matrix.into()) + flops_of_fibres(nodes, tets),
     }
 }
 
@@ -77,6 +80,13 @@ fn flops_of_stretches(terms: usize, nodes: usize, tets: usize) -> usize {
     // Three squarings, a product, the root's power and the sum.
     let term = 4 * 42 + 4 + 24;
     3 * (nodes - 1) + tets * (tet + terms * term) + 3 * (nodes - 1) + 3 * nodes
+}
+
+/// What fibres take beside their matrix.
+fn flops_of_fibres(nodes: usize, tets: usize) -> usize {
+    // w and F a; x; the exponential 22, the pull; forces.
+    let tet = 24 + 12 + 34 + 21;
+    3 * (nodes - 1) + tets * tet + 3 * (nodes - 1) + 3 * nodes
 }
 
 /// Adds the forces (µN) of the clusters to `forces`, given positions (mm, from any origin); returns the smallest det F

@@ -16,8 +16,10 @@ mod bisection;
 mod chunks;
 mod cluster;
 mod cut;
+mod directions;
 mod dispatch;
 mod fault;
+mod fibres;
 mod gradients;
 mod history;
 mod internal_forces;
@@ -42,13 +44,14 @@ pub use batches::{Element, Kind, PADDING, shape_gradients};
 pub use cut::CutTetrahedra;
 pub use dispatch::Kernels;
 pub use fault::MaterialError;
+pub use fibres::{add_mean_stress, stiffest_pull};
 pub use history::StressHistory;
 pub use internal_forces::{ElementForces, ParallelFor, Scratch};
 pub use kernel::flops;
 pub use lanes::{Isa, WIDTH};
 pub use laws::{
-    Invariants, Isochoric, Law, MOST_TERMS, MooneyRivlin, NeoHookean, Ogden, Term, Terms,
-    VerondaWestmann, Yeoh,
+    Fibred, Invariants, Isochoric, Law, MOST_TERMS, Matrix, MooneyRivlin, NeoHookean, Ogden, Term,
+    Terms, VerondaWestmann, Yeoh,
 };
 pub use material::{Material, Moduli};
 pub use partition::{Chunk, Partition};

@@ -49,6 +49,16 @@ pub struct Moduli {
     pub law: Law,
 }
 
+impl Moduli {
+    /// Of the matrix alone.
+    pub fn without_fibres(self) -> Self {
+        Self {
+            law: self.law.matrix(),
+            ..self
+        }
+    }
+}
+
 /// Part by which Young's modulus may differ from that of a law which has its own shear modulus.
 const SAME_MODULUS: f64 = 1e-3;
 

@@ -266,6 +266,7 @@ impl Partition {
             mesh,
             material,
             gradients: self.has_gradients(),
+            directions: self.has_fibres(),
         };
         self.chunks.push(Chunk {
             first,
@@ -328,7 +329,7 @@ impl Partition {
                 [x, y, z].map(f64::from)
             });
             let stiffness = 6.0 * f64::from(element.bulk.abs()) / bulk;
-            let tetrahedron = Tetrahedron::new(corners, at, stiffness);
+            let tetrahedron = Tetrahedron::new(corners, at, stiffness).along(element.fibre);
             // The order of the corners in a cluster may turn an element around.
             let volume = tetrahedron.volume.abs();
             let tetrahedron = Tetrahedron {

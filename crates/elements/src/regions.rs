@@ -18,6 +18,8 @@ pub const MOST_REGIONS: usize = 64;
 const MOST_DENSITY: f64 = 1e5;
 /// Part by which the stiffness of a tetrahedron may differ from that of a law which has its own shear modulus.
 const SAME_MODULUS: f64 = 1e-3;
+/// By how much the length of a direction may differ from 1.
+const UNIT: f64 = 1e-3;
 /// Lengths of steps at which the moduli `g(h)` of regions and material are compared, s.
 const STEPS_S: [f64; 4] = [0.002, 0.01, 0.05, 0.1];
 /// That of a region over the material's at most: what the rest is stressed by in a step is known one step late, and from 2 on would swing without end.
@@ -61,12 +63,19 @@ pub struct Laws<'a> {
     /// `[T]`: 0 for the material's law, else one more than the place in `regions`. Empty where the whole body has the material's.
     pub of_tet: &'a [u8],
     pub regions: &'a [Region],
+    /// `[T]` directions of fibres at rest, unit vectors or zero for an element without. Empty where the body has none.
+    pub fibre: &'a [[f32; 3]],
 }
 
 impl Laws<'_> {
     /// The number of a tetrahedron's law.
     pub fn number_of(&self, tet: usize) -> u8 {
         self.of_tet.get(tet).copied().unwrap_or(0)
+    }
+
+    /// The direction of a tetrahedron's fibres; zero where it has none.
+    pub fn fibre_of(&self, tet: usize) -> [f32; 3] {
+        self.fibre.get(tet).copied().unwrap_or_default()
     }
 
     /// The material's moduli with the law of a tetrahedron.
@@ -127,6 +136,7 @@ impl Laws<'_> {
             let wanted = format!("{tets}, a region for each tetrahedron");
             return fail("length of `region`".into(), self.of_tet.len(), wanted);
         }
+        self.check_fibres(tets)?;
         let has_none = |number: &u8| usize::from(*number) > count;
         match self.of_tet.iter().position(has_none) {
             None => Ok(()),
@@ -136,6 +146,44 @@ impl Laws<'_> {
                 format!("at most {count}: there is no law for it"),
             ),
         }
+    }
+
+    /// Checks the directions of fibres.
+    fn check_fibres(&self, tets: usize) -> Result<(), MaterialError> {
+        let fail = |field: String, value: f64, wanted: String| {
+            MaterialError::some(field, value, wanted).map_or(Ok(()), Err)
+        };
+        if !self.fibre.is_empty() && self.fibre.len() != tets {
+            let wanted = format!("{tets}, a direction for each tetrahedron, or none");
+            return fail("length of `fibre`".into(), self.fibre.len() as f64, wanted);
+        }
+        for (tet, own) in self.fibre.iter().enumerate() {
+            let length = crate::vector::length(own.map(f64::from));
+            // A NaN is neither.
+            if length == 0.0 || (length - 1.0).abs() <= UNIT {
+                continue;
+            }
+            let field = format!("length of `fibre` of tetrahedron {tet}");
+            return fail(field, length, "1, or 0 for no fibres".into());
+        }
+        for (at, region) in self.regions.iter().enumerate() {
+            if region.law.fibres().is_some() {
+                self.check_direction(at as u8 + 1, &format!("region `{}`", region.name))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that some tetrahedron of a law with fibres has a direction.
+    fn check_direction(&self, number: u8, name: &str) -> Result<(), MaterialError> {
+        let has =
+            |(tet, own): (usize, &[f32; 3])| self.number_of(tet) == number && *own != [0.0; 3];
+        if self.fibre.iter().enumerate().any(has) {
+            return Ok(());
+        }
+        let field = format!("{name}: number of directions in `fibre`");
+        let wanted = "1 or more: its law has fibres, and no tetrahedron a direction";
+        MaterialError::some(field, 0.0, wanted).map_or(Ok(()), Err)
     }
 
     /// Checks that no region keeps far more of its stress within a step than the material does.
@@ -179,6 +227,10 @@ impl Laws<'_> {
     ) -> Result<(), MaterialError> {
         self.check(tets)?;
         self.check_relaxation(material)?;
+        let is_used = (0..tets).any(|tet| self.number_of(tet) == 0);
+        if is_used && material.law.fibres().is_some() {
+            self.check_direction(0, "material")?;
+        }
         for (tet, number) in self.of_tet.iter().enumerate() {
             let Some(region) = (usize::from(*number).checked_sub(1)).map(|at| &self.regions[at])
             else {

@@ -3,8 +3,9 @@
 //! All laws are functions of the principal stretches, those by invariants of exponents 2 and -2. With `P = cof F (T/J + p)`,
 //! `p = kappa (J - 1)`: `dP = dcof (T/J + p) + cof F (dT/J - T dJ/J² + kappa dJ)`. In the eigenvectors of `C` the
 //! diagonal of `dT` follows the principal stresses `f(s)`, `s = ln lambda - ln J / 3`, and its other entries are
-//! `(f_i - f_j) / (l_i - l_j) dC_ij` with the eigenvalues `l` of `C`.
+//! `(f_i - f_j) / (l_i - l_j) dC_ij` with the eigenvalues `l` of `C`. Fibres add theirs (`fibres.rs`).
 
+use crate::fibres;
 use crate::laws::Law;
 use crate::material::Moduli;
 use crate::spectrum::spectrum;
@@ -20,10 +21,14 @@ type Matrix = [[f64; 3]; 3];
 
 /// `dP_ij / dF_kl` in row `3 i + j`, column `3 k + l`, Pa; symmetric.
 pub fn tangent(state: &Deformation, moduli: Moduli) -> [[f64; 9]; 9] {
-    tangent_with(state, moduli, 1.0)
+    let mut sum = tangent_with(state, moduli, 1.0);
+    if let Some(own) = moduli.law.fibres() {
+        fibres::add_tangent(own, state, moduli.shear_pa, &mut sum);
+    }
+    sum
 }
 
-/// The same with a part of what the pressure adds by the change of `cof F`.
+/// That of the matrix, with a part of what the pressure adds by the change of `cof F`.
 fn tangent_with(state: &Deformation, moduli: Moduli, turning: f64) -> [[f64; 9]; 9] {
     let f = &state.f;
     let c = [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| f[k][i] * f[k][j]).sum::<f64>()));
@@ -177,13 +182,18 @@ impl Tetrahedron {
     fn stiffness_with(&self, state: &Deformation, moduli: Moduli, turning: f64) -> [[f64; 12]; 12] {
         let [a, b, c] = self.gradients;
         let gradients = [[0, 1, 2].map(|k| -(a[k] + b[k] + c[k])), a, b, c];
-        match moduli.law {
+        let mut sum = match moduli.law.matrix() {
             Law::NeoHookean(_) if state.det > SMALLEST_DET => {
                 neo_hookean(state, moduli, turning, gradients)
                     .map(|row| row.map(|k| self.volume * k))
             }
             _ => self.contract(&tangent_with(state, moduli, turning), gradients),
+        };
+        if let Some(own) = moduli.law.fibres() {
+            let weight = (moduli.shear_pa, self.volume);
+            fibres::add_stiffness(own, state, weight, gradients, &mut sum);
         }
+        sum
     }
 
     /// `V g_a . tangent . g_b` of all corners.

@@ -5,6 +5,7 @@
 //! `P = F S = mu J^(-2/3) (F - I1/(3 J) cof F) + kappa (J - 1) cof F`, which is
 //! `S = mu J^(-2/3) (I - I1/3 C^-1) + kappa J (J - 1) C^-1`. Lengths are mm, moduli Pa: energies nJ, forces µN.
 
+use crate::fibres;
 use crate::laws::{Invariants, Isochoric, Law};
 use crate::material::Moduli;
 use crate::principal::{self, PLACE};
@@ -22,6 +23,8 @@ pub struct Tetrahedron {
     pub volume: f64,
     /// Of the shape functions 1, 2, 3, 1/mm; that of shape function 0 is minus their sum.
     pub gradients: [[f64; 3]; 3],
+    /// Direction of its fibres at rest: a unit vector, or zero for none.
+    pub fibre: [f64; 3],
 }
 
 /// `F` of one element and what the law needs of it.
@@ -35,6 +38,8 @@ pub struct Deformation {
     pub det: f64,
     /// `I1 = |F|²`.
     pub invariant: f64,
+    /// Direction of the fibres at rest: a unit vector, or zero for none.
+    pub fibre: [f64; 3],
 }
 
 impl Tetrahedron {
@@ -51,6 +56,7 @@ impl Tetrahedron {
             corners,
             volume: six_volumes / 6.0 * stiffness,
             gradients: normals.map(|n| n.map(|x| x / six_volumes)),
+            fibre: [0.0; 3],
         }
     }
 
@@ -65,7 +71,7 @@ impl Tetrahedron {
                 }
             }
         }
-        Deformation::of(f)
+        Deformation::of(f).along(self.fibre)
     }
 
     /// `V P g_a` of the four corners, µN; they are in balance.
@@ -101,7 +107,7 @@ impl Tetrahedron {
 }
 
 impl Deformation {
-    /// That of a deformation gradient, rows.
+    /// That of a deformation gradient, rows, of an element without fibres.
     pub fn of(f: [[f64; 3]; 3]) -> Deformation {
         let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
         Deformation {
@@ -109,6 +115,7 @@ impl Deformation {
             cofactor,
             det: dot(f[0], cofactor[0]),
             invariant: f.iter().map(|row| dot(*row, *row)).sum(),
+            fibre: [0.0; 3],
         }
     }
 
@@ -133,6 +140,11 @@ pub fn stress(state: &Deformation, moduli: Moduli) -> [[f64; 3]; 3] {
         Law::Ogden(_) => stress_by_stretches(state, moduli),
         Law::Yeoh(law) => stress_by_invariants(law, state, moduli),
         Law::VerondaWestmann(law) => stress_by_invariants(law, state, moduli),
+        Law::Fibred(own) => {
+            let mut sum = stress(state, moduli.without_fibres());
+            fibres::add_stress(&own, state, moduli.shear_pa, &mut sum);
+            sum
+        }
     }
 }
 
@@ -179,7 +191,7 @@ pub fn energy_density(state: &Deformation, moduli: Moduli) -> f64 {
         + 0.5 * moduli.bulk_pa * (state.det - 1.0) * (state.det - 1.0)
 }
 
-/// `w`: the strain energy without change of volume over the shear modulus, where `det` stands for `det F`.
+/// `w`: the strain energy without change of volume over the shear modulus, where `det` stands for `det F`; with that of fibres.
 pub fn shape_energy(state: &Deformation, law: Law, det: f64) -> f64 {
     match law {
         Law::NeoHookean(law) => law.energy(state.invariants(det)),
@@ -187,11 +199,14 @@ pub fn shape_energy(state: &Deformation, law: Law, det: f64) -> f64 {
         Law::Ogden(_) => principal::energy(&law.stretches(0.0), &state.f),
         Law::Yeoh(law) => law.energy(state.invariants(det)),
         Law::VerondaWestmann(law) => law.energy(state.invariants(det)),
+        Law::Fibred(own) => {
+            shape_energy(state, own.matrix.into(), det) + fibres::energy(&own, state)
+        }
     }
 }
 
 /// How much stiffer than at rest a law is against a change of the shape that a body has: of neo-Hookean and Mooney-Rivlin tissue 1, as an
-/// estimate; of the others the steepest rise of a principal stress with the logarithm of its stretch, over that at rest.
+/// estimate; of the others the steepest rise of a principal stress with the logarithm of its stretch, over that at rest. Of tissue with fibres that of its matrix.
 pub fn stiffening(state: &Deformation, law: Law) -> f64 {
     match law {
         Law::NeoHookean(_) | Law::MooneyRivlin(_) => 1.0,
@@ -200,6 +215,7 @@ pub fn stiffening(state: &Deformation, law: Law) -> f64 {
             let x = principal::first_invariant(&state.f);
             principal::stiffening(&law.stretches(x), &state.f)
         }
+        Law::Fibred(own) => stiffening(state, own.matrix.into()),
     }
 }
 

@@ -7,6 +7,7 @@ use elements::{MOST_REGIONS, Material, Region as LawRegion};
 use tissue::mesh::Mesh;
 use tissue::mesh_import::{Region, tets_in};
 
+use super::fibres;
 use super::material::Choice;
 use super::options::Options;
 use super::stages::Stage;
@@ -24,11 +25,14 @@ pub fn apply(
             Choice::Numbers(_) => None,
         })
         .collect();
+    fibres::apply(mesh, options, (input, scale), stage)?;
+    let has_fibres =
+        |name: &str| (options.fibre.iter()).any(|own| own.name.as_deref() == Some(name));
     for region in &options.region {
         let name = region.name.as_deref().with_context(|| {
             format!("--region {region} has no name; write --region NAME=REGION")
         })?;
-        if !chosen.iter().any(|own| own.name == name) {
+        if !chosen.iter().any(|own| own.name == name) && !has_fibres(name) {
             bail!("region `{name}` has no law; give --material {name}=LAW");
         }
     }
@@ -64,7 +68,7 @@ pub fn apply(
 }
 
 /// The tetrahedra of a region by name: as `--region` has it, else as the mesh file has it, else a group of the input.
-fn tets_of(
+pub(super) fn tets_of(
     mesh: &Mesh,
     options: &Options,
     (input, scale): (&Path, f64),
@@ -86,7 +90,7 @@ fn tets_of(
     }
     let group = Region::Group(name.to_owned()).open(input, scale);
     let group = group.with_context(|| {
-        format!("--material {name}=: there is no region of that name; give --region {name}=REGION")
+        format!("`{name}`: there is no region of that name; give --region {name}=REGION")
     })?;
     Ok(tets_in(mesh, &group))
 }

@@ -28,6 +28,7 @@ mod certify;
 pub mod check;
 mod clock;
 pub mod corrections;
+mod fibres;
 mod fixed;
 mod gravity;
 mod laws;
@@ -48,6 +49,7 @@ mod tables;
 mod unload;
 mod vibration;
 
+pub use fibres::Fibre;
 pub use fixed::Fixed;
 pub use gravity::{Gravity, gravity};
 pub use material::{Choice, ELASTIC};

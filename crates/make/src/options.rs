@@ -10,6 +10,7 @@ use tissue::mesh::Boundary;
 use tissue::mesh_import::Region;
 use tissue::programmes::ToolProgramme;
 
+use super::fibres::Fibre;
 use super::fixed::Fixed;
 use super::gravity::Gravity;
 use super::material::{self, Choice};
@@ -62,6 +63,8 @@ pub struct Options {
     pub material: Vec<Choice>,
     /// Regions that `material` gives a law, by name.
     pub region: Vec<Fixed>,
+    /// Directions of fibres, of such a region or of the whole body.
+    pub fibre: Vec<Fibre>,
     /// Young's modulus, Pa; none: that of the law or the material.
     pub young: Option<f64>,
     pub law: Law,
@@ -128,6 +131,7 @@ impl Options {
             tool_scale: None,
             material: Vec::new(),
             region: Vec::new(),
+            fibre: Vec::new(),
             young: None,
             law: Law::default(),
             law_source: String::new(),
@@ -264,6 +268,9 @@ impl Options {
                 self.material()?
             );
         }
+        for own in &self.fibre {
+            words += &format!(" fibre {own} {:?}", self.region);
+        }
         if let (Some(Gravity(own)), true) = (self.gravity, self.unload) {
             words += &format!(" free of {own:?} {:?}", self.material()?);
         }
@@ -295,7 +302,7 @@ impl Options {
             "boundary": self.boundary.as_str(), "fixed": texts(&self.fixed),
             "pressure": texts(&self.pressure), "domain": texts(&self.domain), "nodes": self.nodes, "gravity": self.gravity.map(|own| own.0), "unload": self.unload,
             "part": self.part, "label": self.label, "refill": self.refill,
-            "material": texts(&self.material), "region": texts(&self.region), "law": material::words(&self.law, &self.law_source), "relaxation": self.relaxation.to_string(), "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
+            "material": texts(&self.material), "region": texts(&self.region), "fibre": texts(&self.fibre), "law": material::words(&self.law, &self.law_source), "relaxation": self.relaxation.to_string(), "corrections": self.corrections.map(|effort| effort.to_string()), "natural": self.natural, "patches": self.patches,
             "tolerance_mm": self.tolerance_mm, "minutes": self.minutes, "tools": self.tools_words(), "tool_scale": self.tool_scale,
         })
     }

@@ -79,10 +79,13 @@ pub fn relaxation(text: &str) -> Result<Relaxation, String> {
 
 /// Where a tissue's law comes from; empty for a law that is no tissue's.
 pub fn source_of(law: &Law) -> String {
-    let own = law.to_string();
+    let own = law.matrix().to_string();
     let found = tissues().into_iter().find(|tissue| tissue.law == own);
+    let part = law
+        .fibres()
+        .map_or("", |_| ", the matrix without its fibres");
     found.map_or_else(String::new, |tissue| {
-        format!("{} ({})", tissue.doi, tissue.tissue)
+        format!("{} ({}{part})", tissue.doi, tissue.tissue)
     })
 }
 
@@ -93,7 +96,14 @@ pub fn law(text: &str) -> Result<Law, String> {
         // Its formula is checked as one that is typed.
         return law.to_string().parse();
     }
-    match tissues().into_iter().find(|tissue| tissue.name == text) {
+    let named = |name: &str| tissues().into_iter().find(|tissue| tissue.name == name);
+    // Fibres in a tissue as their matrix.
+    if let Some((name, fibres)) = text.split_once("+fibres:")
+        && let Some(matrix) = named(name)
+    {
+        return format!("{}+fibres:{fibres}", matrix.law).parse();
+    }
+    match named(text) {
         Some(tissue) => tissue.law.parse(),
         None => text.parse().map_err(|error: String| {
             if text.contains(':') {

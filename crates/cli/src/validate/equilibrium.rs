@@ -8,7 +8,8 @@ pub fn forces(mesh: &Mesh, material: &Material, u: &[[f64; 3]]) -> Vec<[f64; 3]>
     let mut out = vec![[0.0; 3]; mesh.node_count()];
     for (at, corners) in mesh.tets.iter().enumerate() {
         let rest = corners.map(|node| mesh.positions[node as usize].map(f64::from));
-        let element = Tetrahedron::new(*corners, rest, f64::from(mesh.stiffness_of(at)));
+        let element = Tetrahedron::new(*corners, rest, f64::from(mesh.stiffness_of(at)))
+            .along(mesh.laws().fibre_of(at));
         let state = element.deformation(corners.map(|node| u[node as usize]));
         for (node, force) in corners
             .iter()

@@ -85,6 +85,16 @@ fn input_that_cannot_become_a_bundle_is_named_with_what_to_do() {
         ),
         (&["--material", "stone"], "--material is `stone`"),
         (
+            &["--law", "fibres:5,2"],
+            "material: number of directions in `fibre`",
+        ),
+        (&["--law", "fibres:-5,2"], "law.k1_over_mu"),
+        (&["--fibre", "0,0,0"], "three numbers not all 0"),
+        (
+            &["--fibre", "rind=0,0,1"],
+            "there is no region of that name",
+        ),
+        (
             &[
                 "--region",
                 "rind=ball:900,0,0,5",

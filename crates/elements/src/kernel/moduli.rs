@@ -75,7 +75,7 @@ impl Seconds {
     /// `law`, where its kernel is one of these.
     pub fn of(law: Law) -> Option<Self> {
         match law {
-            Law::NeoHookean(_) | Law::Ogden(_) => None,
+            Law::NeoHookean(_) | Law::Ogden(_) | Law::Fibred(_) => None,
             Law::MooneyRivlin(law) => Some(Self::MooneyRivlin(law)),
             Law::Yeoh(law) => Some(Self::Grows(Grows::Yeoh(law))),
             Law::VerondaWestmann(law) => Some(Self::Grows(Grows::VerondaWestmann(law))),

@@ -1,11 +1,13 @@
 //! What relaxation leaves of earlier stresses: the history of each element goes on, and its forces are added ([`crate::StressHistory`] has the equations).
 //!
-//! `S_iso = C^-1 T` with the deviator `T` of [`super::stretches`], for every law; the force of a stress `S` on corner `k` is `-V F S g_k`.
+//! `S_iso = C^-1 T` with the deviator `T` of [`super::stretches`], for every law, and what its fibres pull with; the force of a stress `S` on corner `k` is `-V F S g_k`.
 
+use super::fibres::{LaneFibres, direction};
 use super::gradients::{gradient, of_corners, volume};
 use super::shape::{dot, edges, load};
 use super::stretches::{Eigenvalues, LaneTerms, Strain, deviator, product};
 use crate::cluster::{Cluster, corners};
+use crate::directions::Directions;
 use crate::gradients::Gradients;
 use crate::principal::PLACE;
 use crate::stress_step::{SIX, StressStep};
@@ -37,6 +39,28 @@ unsafe fn second_piola<L: NodeLanes>(cofactor: &[[L; 3]; 3], det: L, t: &[L; 6])
     }
 }
 
+/// Adds the stress of fibres, `2 psi' a (x) a`, Pa.
+#[inline(always)]
+unsafe fn add_fibres<L: NodeLanes, const TETS: usize>(
+    fibres: &LaneFibres,
+    (directions, tet, first): (&Directions<TETS>, usize, usize),
+    h: &[[L; 3]; 3],
+    out: &mut [L; 6],
+) {
+    unsafe {
+        let a: [L; 3] = direction(directions, tet, first);
+        let w = [dot(h[0], a), dot(h[1], a), dot(h[2], a)];
+        let pull = fibres.pull_of(a, w);
+        let mut at = 0;
+        for i in 0..3 {
+            for j in i..3 {
+                out[at] = pull.mul(a[i]).mul_add(a[j], out[at]);
+                at += 1;
+            }
+        }
+    }
+}
+
 /// Asks for `lines` of the cache that lie `bytes` behind what is at hand.
 #[inline(always)]
 fn ahead<T>(at: *const T, bytes: usize, lines: usize) {
@@ -44,12 +68,19 @@ fn ahead<T>(at: *const T, bytes: usize, lines: usize) {
     (0..lines).for_each(|line| lanes::prefetch(start.wrapping_add(LINE * line)));
 }
 
+/// Clusters with their gradients, and with the directions of their fibres or none.
+type Batches<'a, const NODES: usize, const TETS: usize> = (
+    &'a [Cluster<NODES, TETS>],
+    &'a [Gradients<TETS>],
+    &'a [Directions<TETS>],
+);
+
 /// Takes the stresses at displacements (mm) into the `history` of the clusters, and adds the forces (µN) of the first `ROWS` rows of weights.
 #[inline(always)]
 pub unsafe fn relax<L: Eigenvalues, const NODES: usize, const TETS: usize, const ROWS: usize>(
-    law: &LaneTerms,
+    (law, fibres): (&LaneTerms, Option<&LaneFibres>),
     step: &StressStep,
-    (clusters, gradients): (&[Cluster<NODES, TETS>], &[Gradients<TETS>]),
+    (clusters, gradients, directions): Batches<'_, NODES, TETS>,
     history: *mut f32,
     nodes: *const [f32; 4],
     forces: [*mut [f32; 4]; 2],
@@ -58,7 +89,7 @@ pub unsafe fn relax<L: Eigenvalues, const NODES: usize, const TETS: usize, const
         let zero = L::splat(0.0);
         let row = SIX * WIDTH;
         let mut history = history;
-        for (cluster, gradients) in clusters.iter().zip(gradients) {
+        for (batch, (cluster, gradients)) in clusters.iter().zip(gradients).enumerate() {
             // What is remembered is more than caches hold, and no core waits for it where it is asked for a batch ahead.
             ahead(cluster.slots.as_ptr(), size_of_val(cluster), NODES / 2 + 1);
             for first in (0..WIDTH).step_by(L::COUNT) {
@@ -71,7 +102,10 @@ pub unsafe fn relax<L: Eigenvalues, const NODES: usize, const TETS: usize, const
                     let (cofactor, change) = volume(&h);
                     let det = change.add(L::splat(1.0));
                     let t = deviator(law, &Strain::new(&h));
-                    let now = second_piola(&cofactor, det, &t);
+                    let mut now = second_piola(&cofactor, det, &t);
+                    if let (Some(fibres), Some(own)) = (fibres, directions.get(batch)) {
+                        add_fibres(fibres, (own, tet, first), &h, &mut now);
+                    }
                     let own = history.add(tet * (step.count + 1) * row + first);
                     if first == 0 {
                         let lines = (step.count + 1) * SIX;

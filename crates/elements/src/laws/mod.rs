@@ -1,6 +1,6 @@
-//! Laws of isotropic hyperelastic tissue. A law is one file here, a variant of [`Law`] and a row in its two tables.
+//! Laws of hyperelastic tissue. A law is one file here, a variant of [`Law`] and a row in its two tables.
 //!
-//! All laws have the energy `W = mu w(I1, I2, J) + kappa/2 (J - 1)²` a rest volume, with the invariants `I1 = |F|²`, `I2 = |cof F|²`,
+//! All isotropic laws have the energy `W = mu w(I1, I2, J) + kappa/2 (J - 1)²` a rest volume, with the invariants `I1 = |F|²`, `I2 = |cof F|²`,
 //! `J = det F`, and `w` without change of volume: so that its second derivatives at rest are those of `(mu, 0)`, stiffness
 //! at rest, natural modes and the linear response are the same for every law. With the slopes
 //! `f1 = 2 dw/dI1`, `f2 = 2 dw/dI2`, `g = dw/dJ` the stress is
@@ -9,8 +9,11 @@
 //! [`Ogden`]'s law has no such `w`: it is written in the principal stretches, has its own shear modulus, and files of its own for
 //! stress (`principal.rs`, `tangent.rs`) and kernel.
 //!
+//! [`Fibred`] adds fibres to any of them.
+//!
 //! REQ-081: The stress of every law is the derivative of its energy, on every instruction set.
 
+mod fibred;
 mod grows;
 mod growth;
 mod isochoric;
@@ -27,6 +30,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
+pub use fibred::{Fibred, Matrix};
 pub(crate) use grows::Grows;
 pub use growth::Growing;
 pub use isochoric::{Invariants, Isochoric, LaneSlopes, Slopes};
@@ -52,10 +56,13 @@ pub enum Law {
     Yeoh(Yeoh),
     /// `w = (exp(beta x) - 1) / beta - (J^(-4/3) I2 - 3) / 2`.
     VerondaWestmann(VerondaWestmann),
+    /// An isotropic law, and `w + k1/(2 k2 mu) (exp(k2 x²) - 1)` where `x = |F a|² - 1` of the element's fibres is positive.
+    #[serde(rename = "fibres")]
+    Fibred(Fibred),
 }
 
 /// The names that [`Law::from_str`] takes.
-const NAMES: &str = "neo-hookean, mooney-rivlin, mooney-rivlin:SHARE with a share of C01 from 0 to 1, yeoh:C2/C1[,C3/C1] as numbers, veronda-westmann:BETA, or ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it";
+const NAMES: &str = "neo-hookean, mooney-rivlin, mooney-rivlin:SHARE with a share of C01 from 0 to 1, yeoh:C2/C1[,C3/C1] as numbers, veronda-westmann:BETA, or ogden:MU,ALPHA[,MU,ALPHA...] with MU in Pa or with kPa behind it; +fibres:K1/MU,K2 behind any of them adds fibres, fibres:K1/MU,K2 alone has them in neo-hookean";
 
 impl Default for Law {
     fn default() -> Self {
@@ -96,6 +103,7 @@ impl Law {
             },
             Self::Yeoh(law) => grown(*law, x),
             Self::VerondaWestmann(law) => grown(*law, x),
+            Self::Fibred(law) => Self::from(law.matrix).stretches(x),
         }
     }
 
@@ -105,27 +113,62 @@ impl Law {
             Self::NeoHookean(_) | Self::MooneyRivlin(_) | Self::Ogden(_) => None,
             Self::Yeoh(law) => Some(Grows::Yeoh(*law)),
             Self::VerondaWestmann(law) => Some(Grows::VerondaWestmann(*law)),
+            Self::Fibred(law) => Self::from(law.matrix).grows(),
+        }
+    }
+
+    /// The law without its fibres; itself where it has none.
+    #[inline]
+    pub fn matrix(&self) -> Self {
+        match self {
+            Self::Fibred(law) => law.matrix.into(),
+            _ => *self,
+        }
+    }
+
+    /// Its fibres.
+    #[inline]
+    pub fn fibres(&self) -> Option<&Fibred> {
+        match self {
+            Self::Fibred(law) => Some(law),
+            _ => None,
         }
     }
 
     /// Whether the kernel takes displacements and gradients, and not positions and springs.
     pub(crate) fn takes_displacements(&self) -> bool {
-        matches!(self, Self::Ogden(_))
+        matches!(self.matrix(), Self::Ogden(_))
     }
 
     /// Young's modulus where the law has a shear modulus of its own, Pa.
     pub fn young_pa(&self, poisson: f64) -> Option<f64> {
         match self {
             Self::Ogden(law) => Some(2.0 * (1.0 + poisson) * law.shear_pa()),
+            Self::Fibred(law) => Self::from(law.matrix).young_pa(poisson),
             _ => None,
         }
     }
 
-    /// With a shear modulus of its own: `part` of it.
+    /// With a shear modulus of its own: `part` of it. `k1` of fibres follows, since it is a multiple of that modulus.
     pub(crate) fn times(self, part: f64) -> Self {
         match self {
             Self::Ogden(law) => Self::Ogden(law.times(part)),
+            Self::Fibred(law) => match Self::from(law.matrix).times(part).try_into() {
+                Ok(matrix) => Self::Fibred(Fibred { matrix, ..law }),
+                Err(_) => self,
+            },
             _ => self,
+        }
+    }
+
+    /// Itself where its constants are admitted.
+    fn checked(self) -> Result<Self, String> {
+        match self.fault() {
+            None => Ok(self),
+            Some(fault) => Err(format!(
+                "{} is {}; it must be {}",
+                fault.field, fault.value, fault.wanted
+            )),
         }
     }
 
@@ -137,6 +180,7 @@ impl Law {
             Self::Ogden(law) => law.fault(),
             Self::Yeoh(law) => law.fault(),
             Self::VerondaWestmann(law) => law.fault(),
+            Self::Fibred(law) => law.fault(),
         }
     }
 }
@@ -152,6 +196,7 @@ impl fmt::Display for Law {
             Self::Ogden(law) => law.fmt(f),
             Self::Yeoh(law) => write!(f, "yeoh:{},{}", law.c2_over_c1, law.c3_over_c1),
             Self::VerondaWestmann(law) => write!(f, "veronda-westmann:{}", law.beta),
+            Self::Fibred(law) => law.fmt(f),
         }
     }
 }
@@ -161,6 +206,13 @@ impl FromStr for Law {
 
     /// A name, and after a colon the law's constant.
     fn from_str(text: &str) -> Result<Self, String> {
+        let (matrix, fibres) = match text.split_once("+fibres:") {
+            Some((matrix, fibres)) => (matrix.parse()?, Some(fibres)),
+            None => (Self::default(), text.strip_prefix("fibres:")),
+        };
+        if let Some(fibres) = fibres {
+            return Self::Fibred(Fibred::parse(fibres, matrix)?).checked();
+        }
         let (name, constant) = match text.split_once(':') {
             None => (text, None),
             Some((name, constant)) => (name, Some(constant)),
@@ -188,12 +240,6 @@ impl FromStr for Law {
             ("ogden", Some(constants)) => Self::Ogden(Ogden::parse(constants)?),
             _ => return Err(format!("law `{text}` is unknown: use {NAMES}")),
         };
-        match law.fault() {
-            None => Ok(law),
-            Some(fault) => Err(format!(
-                "{} is {}; it must be {}",
-                fault.field, fault.value, fault.wanted
-            )),
-        }
+        law.checked()
     }
 }

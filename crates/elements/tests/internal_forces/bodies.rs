@@ -11,6 +11,27 @@ pub fn body() -> Mesh {
     mesh
 }
 
+/// A body with fibres in several matrices, in all directions; one element in nine has none.
+pub fn fibred() -> Mesh {
+    let law = |text: &str| text.parse().unwrap();
+    let mut mesh = blocks(&[
+        law("fibres:20,3"),
+        law("mooney-rivlin:0.7+fibres:4,0"),
+        law(&format!("{}+fibres:2,10", ogden_laws()[1].law)),
+    ]);
+    mesh.fibre = (0..mesh.tets.len())
+        .map(|tet| {
+            let (turn, up) = (0.37 * tet as f32, (0.11 * tet as f32).sin());
+            let flat = (1.0 - up * up).sqrt();
+            match tet % 9 {
+                0 => [0.0; 3],
+                _ => [flat * turn.cos(), flat * turn.sin(), up],
+            }
+        })
+        .collect();
+    mesh
+}
+
 /// The same with blocks of each of some laws; the rest has the material's.
 pub fn blocks(laws: &[Law]) -> Mesh {
     let mut mesh = body();
@@ -49,7 +70,8 @@ pub fn exact(mesh: &Mesh, material: &Material, u: &[f32]) -> (Vec<f64>, f64) {
     let mut least = f64::INFINITY;
     for (at, &corners) in mesh.tets.iter().enumerate() {
         let rest = corners.map(|node| mesh.positions[node as usize].map(f64::from));
-        let tet = Tetrahedron::new(corners, rest, f64::from(mesh.stiffness_of(at)));
+        let tet = Tetrahedron::new(corners, rest, f64::from(mesh.stiffness_of(at)))
+            .along(mesh.laws().fibre_of(at));
         let state =
             tet.deformation(corners.map(|n| [0, 1, 2].map(|k| f64::from(u[3 * n as usize + k]))));
         least = least.min(state.det);

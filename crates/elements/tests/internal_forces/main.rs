@@ -3,7 +3,7 @@
 mod bodies;
 mod regions;
 
-use bodies::{body, exact, forces_on, mixed, ogden_laws, serial, wave};
+use bodies::{body, exact, fibred, forces_on, mixed, ogden_laws, serial, wave};
 use elements::{
     CutTetrahedra, ElementForces, Isa, Law, Material, MooneyRivlin, Subset, VerondaWestmann, Yeoh,
 };
@@ -24,6 +24,31 @@ fn they_are_those_of_the_law_on_every_instruction_set() {
             law,
             ..Material::default()
         });
+    }
+}
+
+/// Beside a body without any; strains up to a third, beyond the cap of the stiffest.
+///
+/// Verifies REQ-099.
+#[test]
+fn those_of_fibres_are_those_of_f64() {
+    let mesh = fibred();
+    for size in [0.05, 0.6] {
+        check_of(&mesh, &Material::default(), size);
+    }
+    let mut without = mesh.clone();
+    without.fibre.fill([0.0; 3]);
+    let mut matrix = mesh.clone();
+    for region in &mut matrix.regions {
+        region.law = region.law.matrix();
+    }
+    matrix.fibre.clear();
+    let u = wave(&mesh, 0.6);
+    for isa in Isa::available() {
+        let of = |mesh: &Mesh| forces_on(isa, mesh, &Material::default(), &u);
+        // Fibres that no element has add a zero.
+        assert_eq!(of(&without), of(&matrix));
+        assert_ne!(of(&mesh), of(&matrix));
     }
 }
 
@@ -107,6 +132,7 @@ fn threads_do_not_change_a_bit() {
         check_threads(&body(), &material);
     }
     check_threads(&mixed(), &Material::default());
+    check_threads(&fibred(), &Material::default());
 }
 
 fn check_threads(mesh: &Mesh, material: &Material) {
@@ -198,6 +224,7 @@ fn a_subset_has_the_forces_of_the_body_where_it_is_whole() {
         (body(), Material::default()),
         (body(), ogden_laws()[0]),
         (mixed(), Material::default()),
+        (fibred(), Material::default()),
     ] {
         for isa in Isa::available() {
             let forces = ElementForces::new(mesh.tetrahedra(), &material, isa).unwrap();
@@ -228,6 +255,7 @@ fn a_cut_body_has_the_forces_of_its_elements_whatever_they_were_packed_with() {
     for (mesh, materials) in [
         (body(), vec![Material::default(), ogden_laws()[0]]),
         (mixed(), vec![Material::default()]),
+        (fibred(), vec![Material::default()]),
     ] {
         check_cut(&mesh, &materials);
     }
@@ -277,6 +305,9 @@ fn check_cut(mesh: &Mesh, materials: &[Material]) {
     let numbers = |element: &usize| mesh.region.get(*element).copied();
     let parents = cells.iter().map(|cell| changed[cell.0 as usize] as usize);
     let all = left.iter().copied().chain(parents);
+    whole.fibre = (all.clone())
+        .filter_map(|element| mesh.fibre.get(element).copied())
+        .collect();
     whole.region = all.filter_map(|element| numbers(&element)).collect();
     let mut u = wave(&whole, 0.3);
     // What no element is left of may be turned inside out.
@@ -290,6 +321,7 @@ fn check_cut(mesh: &Mesh, materials: &[Material]) {
                 positions: &whole.positions,
                 tets: &mesh.tets,
                 stiffness: &mesh.stiffness,
+                fibre: &mesh.fibre,
                 changed: &changed,
                 cells: &cells,
             };

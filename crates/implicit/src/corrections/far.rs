@@ -13,7 +13,7 @@
 
 mod cut;
 
-use ::elements::{Deformation, Law, Moduli, stress};
+use ::elements::{Deformation, Law, Moduli, Tetrahedron, add_mean_stress, stress};
 
 use super::body::Body;
 use crate::bundle::{Mesh, volume};
@@ -34,9 +34,7 @@ pub(super) const NINE: usize = 9;
 pub struct FarField {
     #[held(skip)]
     pub(super) moduli: Moduli,
-    /// The law of each cluster where the body has several.
-    #[held(skip)]
-    laws: Vec<Law>,
+    laws: ClusterLaws,
     /// Chunks of a cluster, one after another.
     pub(super) group: usize,
     /// Rest volume of each chunk times its stiffness over the material's, mm³. After a cut these are the chunks of the intact body, with all that their
@@ -52,6 +50,46 @@ pub struct FarField {
     pub(super) cluster_of: Vec<u16>,
     /// Mean edge of the elements, were they regular, mm.
     pub(super) edge_mm: f32,
+}
+
+/// What clusters are made of where that is not the material's law alone.
+#[derive(Default, HeldBytes)]
+struct ClusterLaws {
+    /// The law of each cluster where the body has several.
+    #[held(skip)]
+    laws: Vec<Law>,
+    /// Mean structure tensor of each cluster's fibres, `sum v a (x) a / sum v`, where the body has some.
+    structure: Vec<[[f64; 3]; 3]>,
+}
+
+impl ClusterLaws {
+    fn copied(&self) -> Result<Self> {
+        Ok(Self {
+            laws: memory::copied(&self.laws, WHAT)?,
+            structure: memory::copied(&self.structure, WHAT)?,
+        })
+    }
+
+    /// Adds an element's fibres to those of its cluster.
+    fn add(&mut self, cluster: usize, element: &Tetrahedron) {
+        let Some(sum) = self.structure.get_mut(cluster) else {
+            return;
+        };
+        let a = element.fibre;
+        for (row, x) in sum.iter_mut().zip(a) {
+            for (sum, y) in row.iter_mut().zip(a) {
+                *sum += element.volume * x * y;
+            }
+        }
+    }
+
+    /// Sums over clusters of `group` chunks become means.
+    fn divide(&mut self, volumes: &[f64], group: usize) {
+        for (own, chunks) in self.structure.iter_mut().zip(volumes.chunks(group)) {
+            let whole: f64 = chunks.iter().sum();
+            own.as_flattened_mut().iter_mut().for_each(|x| *x /= whole);
+        }
+    }
 }
 
 /// The chunks that the elements are packed in: after a cut others than those of the intact body.
@@ -133,7 +171,7 @@ impl FarField {
         let count = elements.chunk_count();
         let mut own = FarField {
             moduli,
-            laws: Vec::new(),
+            laws: ClusterLaws::default(),
             group: (count / CLUSTERS).max(1),
             volumes: memory::room(count, WHAT)?,
             packed: PackedChunks {
@@ -150,11 +188,15 @@ impl FarField {
             // Chunks have one law, and so have clusters.
             own.group = 1;
             let laws = (0..count).map(|chunk| elements.moduli_of(chunk).law);
-            own.laws = memory::collected(count, laws, WHAT)?;
+            own.laws.laws = memory::collected(count, laws, WHAT)?;
+        }
+        if !mesh.fibre.is_empty() {
+            own.laws.structure = memory::filled(count.div_ceil(own.group), [[0.0; 3]; 3], WHAT)?;
         }
         for chunk in 0..count {
             own.push(body, mesh, chunk)?;
         }
+        own.laws.divide(&own.volumes, own.group);
         let sixfold = |tet: &[u32; 4]| volume(&mesh.positions, tet);
         let whole: f64 = mesh.tets.as_chunks().0.iter().map(sixfold).sum();
         // A regular tetrahedron's is a³ / sqrt 2.
@@ -172,6 +214,7 @@ impl FarField {
         for (number, element) in body.forces.chunk_tetrahedra(chunk) {
             self.cluster_of[number as usize] = (chunk / self.group) as u16;
             volume += element.volume;
+            self.laws.add(chunk / self.group, &element);
             let [a, b, c] = element.gradients;
             let first = [0, 1, 2].map(|k| -(a[k] + b[k] + c[k]));
             for (corner, gradient) in element.corners.into_iter().zip([first, a, b, c]) {
@@ -252,7 +295,7 @@ impl FarField {
     /// The material's moduli with the law of a cluster.
     pub(super) fn moduli_of(&self, cluster: usize) -> Moduli {
         Moduli {
-            law: self.laws.get(cluster).copied().unwrap_or(self.moduli.law),
+            law: (self.laws.laws.get(cluster).copied()).unwrap_or(self.moduli.law),
             ..self.moduli
         }
     }
@@ -266,7 +309,11 @@ impl FarField {
             }
         }
         let state = Deformation::of(f);
-        let stress = stress(&state, self.moduli_of(cluster));
+        let moduli = self.moduli_of(cluster);
+        let mut stress = stress(&state, moduli);
+        if let (Some(fibres), Some(own)) = (moduli.law.fibres(), self.laws.structure.get(cluster)) {
+            add_mean_stress(fibres, &f, (own, moduli.shear_pa), &mut stress);
+        }
         let lambda = self.moduli.bulk_pa - 2.0 / 3.0 * self.moduli.shear_pa;
         let trace = h[0] + h[4] + h[8];
         let mut added = [0.0; NINE];

@@ -106,6 +106,14 @@ impl Mesh {
                     .map_err(|error| field("laws", format!("is no list of regions: {error}")))?,
                 None => Vec::new(),
             },
+            fibre: match file.tensor("fibre") {
+                Ok(_) => {
+                    let values = tensor("fibre", safetensors::Dtype::F32, Some(3))?;
+                    let values: Vec<f32> = tensors::f32_values(&values).collect();
+                    values.as_chunks().0.to_vec()
+                }
+                Err(_) => Vec::new(),
+            },
         })
     }
 
@@ -186,6 +194,18 @@ impl Mesh {
                 Dtype::I32,
                 vec![self.region.len()],
                 index_bytes(&mut self.region.iter().map(|number| u32::from(*number))),
+            ));
+        }
+        if !self.fibre.is_empty() {
+            tensors.push(Tensor::new(
+                "fibre",
+                Dtype::F32,
+                rows(self.fibre.len(), 3),
+                self.fibre
+                    .iter()
+                    .flatten()
+                    .flat_map(|v| v.to_le_bytes())
+                    .collect(),
             ));
         }
         tensors::write_file(path, &metadata, &tensors).map_err(|source| MeshError::Io {

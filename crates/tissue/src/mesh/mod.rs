@@ -47,6 +47,8 @@ pub struct Mesh {
     pub region: Vec<u8>,
     /// Regions with a law of their own.
     pub regions: Vec<elements::Region>,
+    /// `[T]` directions of fibres at rest, unit vectors or zero for a tetrahedron without; empty where the body has none.
+    pub fibre: Vec<[f32; 3]>,
 }
 
 /// Which nodes are held at zero displacement.
@@ -105,6 +107,7 @@ impl Mesh {
         elements::Laws {
             of_tet: &self.region,
             regions: &self.regions,
+            fibre: &self.fibre,
         }
     }
 
@@ -148,7 +151,7 @@ impl Mesh {
     }
 
     /// SHA-256 (lower-case hex) over the bytes of `positions`, `tets`, `fixed`, `supported` and,
-    /// where there is one, `stiffness`, and `region` and the text `laws`, as the file stores them. Identifies the mesh in trajectories, datasets and bundles.
+    /// where there is one, `stiffness`, `region` and the text `laws`, and `fibre`, as the file stores them. Identifies the mesh in trajectories, datasets and bundles.
     pub fn hash(&self) -> String {
         let mut digest = Sha256::new();
         for value in self.positions.iter().flatten() {
@@ -168,6 +171,9 @@ impl Mesh {
                 digest.update(i32::from(*number).to_le_bytes());
             }
             digest.update(self.laws_text());
+        }
+        for value in self.fibre.iter().flatten() {
+            digest.update(value.to_le_bytes());
         }
         digest
             .finalize()

@@ -14,6 +14,8 @@ pub(super) struct Topology {
     /// Of the mesh's elements; empty where the body has one law.
     pub region: Vec<u8>,
     pub regions: Vec<elements::Region>,
+    /// Of the mesh's elements; empty where the body has none.
+    pub fibre: Vec<[f32; 3]>,
     /// Made at the first change.
     pub body: Option<Body>,
 }
@@ -32,6 +34,7 @@ impl Topology {
             stiffness: mesh.stiffness.clone(),
             region: mesh.region.clone(),
             regions: mesh.regions.clone(),
+            fibre: mesh.fibre.clone(),
             body: None,
         }
     }
@@ -41,6 +44,7 @@ impl Topology {
         elements::Laws {
             of_tet: &self.region,
             regions: &self.regions,
+            fibre: &self.fibre,
         }
     }
 }

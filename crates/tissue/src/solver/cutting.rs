@@ -148,12 +148,14 @@ impl Solver {
             .collect();
         let (mut tets, mut shares) = (Vec::new(), Vec::new());
         let (mut stiffness, mut region) = (Vec::new(), Vec::new());
+        let mut fibre = Vec::new();
         for element in body.elements() {
             tets.push(element.nodes);
             shares.push(element.share as f32);
             let own = self.topology.stiffness.get(element.parent as usize);
             stiffness.push(own.copied().unwrap_or(1.0) * element.stiffness);
             region.extend(self.topology.region.get(element.parent as usize));
+            fibre.extend(self.topology.fibre.get(element.parent as usize));
         }
         let tetrahedra = Tetrahedra {
             positions: &positions,
@@ -162,6 +164,7 @@ impl Solver {
             laws: Laws {
                 of_tet: &region,
                 regions: &self.topology.regions,
+                fibre: &fibre,
             },
         };
         let held = self.held_copies(&body);

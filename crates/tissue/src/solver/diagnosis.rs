@@ -84,7 +84,7 @@ impl Solver {
                     displacement[corner][k] = f64::from(moved[k]);
                 }
             }
-            let state = element_state(rest, displacement, moduli);
+            let state = element_state((rest, element.fibre), displacement, moduli);
             let determinant = state.deformation.det;
             result.note(determinant, number);
             let speed_squared = f64::from(self.speed_squared[number]);
@@ -216,7 +216,11 @@ struct ElementState {
 }
 
 #[inline]
-fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4], moduli: Moduli) -> ElementState {
+fn element_state(
+    (rest, fibre): ([[f32; 3]; 4], [f32; 3]),
+    displacement: [[f64; 3]; 4],
+    moduli: Moduli,
+) -> ElementState {
     let (slopes, volume) = shape_gradients(rest);
     let mut f = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut gradients = [[0.0; 3]; 4];
@@ -230,7 +234,7 @@ fn element_state(rest: [[f32; 3]; 4], displacement: [[f64; 3]; 4], moduli: Modul
             }
         }
     }
-    let deformation = Deformation::of(f);
+    let deformation = Deformation::of(f).along(fibre.map(f64::from));
     ElementState {
         volume: volume.abs(),
         bound: stiffest(&gradients, &deformation, moduli),

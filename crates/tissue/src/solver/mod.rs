@@ -206,6 +206,7 @@ impl Solver {
         };
         solver.critical_at_rest = solver.estimate_critical_step();
         solver.bound_at_rest = solver.diagnose().largest_bound;
+        solver.critical_at_rest *= solver.tautness_at_rest();
         solver.reset();
         Ok(solver)
     }

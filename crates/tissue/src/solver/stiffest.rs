@@ -2,10 +2,10 @@
 //!
 //! Pressure waves cross it along its thinnest direction: the largest eigenvalue of its stiffness over volume and modulus at rest is near
 //! `sum_a |cof F dN_a/dX|²`, the gradients in the present shape. A law that stiffens adds to the wave's modulus `kappa + 4/3 mu`: its second part
-//! goes with the steepest principal stress.
+//! goes with the steepest principal stress. Fibres add what they pull with along their direction; slack ones what they will as soon as they are taut.
 
 use elements::vector::dot;
-use elements::{Deformation, Law, Moduli, stiffening};
+use elements::{Deformation, Law, Moduli, stiffening, stiffest_pull};
 
 /// Least `det F` by which the second part grows.
 const LEAST_DET: f64 = 0.05;
@@ -19,12 +19,19 @@ pub(super) fn stiffest(gradients: &[[f64; 3]; 4], state: &Deformation, moduli: M
             bound += image * image;
         }
     }
-    match moduli.law {
+    let own = match moduli.law.matrix() {
         Law::NeoHookean(_) | Law::MooneyRivlin(_) => bound,
-        Law::Ogden(_) | Law::Yeoh(_) | Law::VerondaWestmann(_) => {
+        Law::Ogden(_) | Law::Yeoh(_) | Law::VerondaWestmann(_) | Law::Fibred(_) => {
             let shear = 4.0 / 3.0 * moduli.shear_pa;
             let stiff = stiffening(state, moduli.law).max(1.0) / state.det.max(LEAST_DET);
             bound * (moduli.bulk_pa + shear * stiff) / (moduli.bulk_pa + shear)
+        }
+    };
+    match moduli.law.fibres() {
+        None => own,
+        Some(_) => {
+            let wave = moduli.bulk_pa + 4.0 / 3.0 * moduli.shear_pa;
+            own + stiffest_pull(gradients, state, &moduli) / wave
         }
     }
 }

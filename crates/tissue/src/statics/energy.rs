@@ -52,6 +52,7 @@ impl StrainEnergy {
         let elements = mesh.tets.iter().enumerate().map(|(at, &corners)| {
             let rest = corners.map(|node| mesh.positions[node as usize].map(f64::from));
             Tetrahedron::new(corners, rest, f64::from(mesh.stiffness_of(at)))
+                .along(mesh.laws().fibre_of(at))
         });
         Self {
             elements: elements.collect(),

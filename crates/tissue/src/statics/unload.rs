@@ -150,7 +150,8 @@ impl Scan<'_> {
             if !(part > SMALLEST_VOLUME && part < 1.0 / SMALLEST_VOLUME) {
                 return None;
             }
-            let element = Tetrahedron::new(*corners, places, f64::from(self.mesh.stiffness_of(at)));
+            let element = Tetrahedron::new(*corners, places, f64::from(self.mesh.stiffness_of(at)))
+                .along(self.mesh.laws().fibre_of(at));
             let state = element.deformation(corners.map(|node| {
                 let node = node as usize;
                 [0, 1, 2].map(|k| self.places[node][k] - rest[node][k])

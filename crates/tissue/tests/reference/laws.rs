@@ -65,6 +65,7 @@ fn pulled(moduli: Moduli, along: f64) -> [f64; 2] {
                 ],
                 det: across * across * along,
                 invariant: 2.0 * across * across + along * along,
+                fibre: [0.0; 3],
             },
             moduli,
         )

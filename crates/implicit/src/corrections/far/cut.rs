@@ -40,7 +40,7 @@ impl FarField {
         let (count, parents) = (self.volumes.len(), forces.cut_chunks());
         let mut own = FarField {
             moduli: self.moduli,
-            laws: memory::copied(&self.laws, WHAT)?,
+            laws: self.laws.copied()?,
             group: self.group,
             volumes: memory::copied(&self.volumes, WHAT)?,
             packed: PackedChunks {

@@ -26,11 +26,16 @@ struct Linear {
 
 /// The elements; see [`super::near`] for what a place is.
 #[derive(Default, HeldBytes)]
-pub(super) struct LinearElements(Vec<Linear>);
+pub(super) struct LinearElements {
+    all: Vec<Linear>,
+    /// Directions of fibres at rest, as far as the last element that has one.
+    fibres: Vec<[f64; 3]>,
+}
 
 impl LinearElements {
     pub fn clear(&mut self) {
-        self.0.clear();
+        self.all.clear();
+        self.fibres.clear();
     }
 
     /// Adds an element, with mesh nodes for places until [`LinearElements::take_places`].
@@ -45,34 +50,43 @@ impl LinearElements {
             lambda: (lambda * element.volume) as f32,
         };
         // A large list, of a scene's own: its room grows by an eighth, once it has some thousands.
-        if self.0.len() == self.0.capacity() {
-            let more = (self.0.len() / 8).max(4096);
-            memory::reserve(&mut self.0, more, WHAT)?;
+        if self.all.len() == self.all.capacity() {
+            let more = (self.all.len() / 8).max(4096);
+            memory::reserve(&mut self.all, more, WHAT)?;
         }
-        self.0.push(linear);
+        self.all.push(linear);
+        if element.fibre != [0.0; 3] {
+            let count = self.all.len();
+            if self.fibres.capacity() < count {
+                let more = self.all.capacity() - self.fibres.len();
+                memory::reserve(&mut self.fibres, more, WHAT)?;
+            }
+            self.fibres.resize(count - 1, [0.0; 3]);
+            self.fibres.push(element.fibre);
+        }
         Ok(())
     }
 
     /// Takes the places of the corners.
     pub fn take_places(&mut self, of_node: &[u32]) {
-        for element in &mut self.0 {
+        for element in &mut self.all {
             element.places = element.places.map(|node| of_node[node as usize]);
         }
     }
 
     /// How many they are.
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.all.len()
     }
 
     /// The places of the corners.
     pub fn places(&self) -> impl Iterator<Item = [u32; 4]> + '_ {
-        self.0.iter().map(|element| element.places)
+        self.all.iter().map(|element| element.places)
     }
 
     /// The places of the corners of one element.
     pub fn places_of(&self, at: usize) -> [u32; 4] {
-        self.0[at].places
+        self.all[at].places
     }
 
     /// Those elements that have a corner at one of the first places that is asked for, ascending.
@@ -87,18 +101,19 @@ impl LinearElements {
 
     /// An element, its corners as places, and its moduli.
     pub fn tetrahedron(&self, at: usize, far: &FarField) -> (Tetrahedron, Moduli) {
-        let element = &self.0[at];
+        let element = &self.all[at];
         let tetrahedron = Tetrahedron {
             corners: element.places,
             volume: f64::from(element.shear) / far.moduli.shear_pa,
             gradients: element.gradients.map(|g| g.map(f64::from)),
+            fibre: self.fibres.get(at).copied().unwrap_or_default(),
         };
         (tetrahedron, far.moduli_of(element.cluster as usize))
     }
 
     /// The largest entry of the gradient of a field in an element.
     pub fn largest_gradient(&self, at: usize, field: impl Fn(u32) -> [f32; 3]) -> f32 {
-        let element = &self.0[at];
+        let element = &self.all[at];
         let [first, rest @ ..] = element.places.map(field);
         let mut h = [[0.0f32; 3]; 3];
         for (corner, gradient) in rest.iter().zip(&element.gradients) {
@@ -118,8 +133,8 @@ impl LinearElements {
     pub fn apply(&self, v: &[f32], some: Option<&[u32]>, out: &mut [f32]) {
         out.fill(0.0);
         match some {
-            Some(some) => apply(some.iter().map(|at| &self.0[*at as usize]), v, out),
-            None => apply(self.0.iter(), v, out),
+            Some(some) => apply(some.iter().map(|at| &self.all[*at as usize]), v, out),
+            None => apply(self.all.iter(), v, out),
         }
     }
 }
@@ -212,7 +227,7 @@ impl Parts {
             let start = cluster.checked_sub(1).map_or(0, |before| self.ends[before]);
             let own = start as usize..self.ends[cluster] as usize;
             let (mut volume, mut largest) = (0.0f64, 0.0f32);
-            for element in self.order[own].iter().map(|at| &elements.0[*at as usize]) {
+            for element in self.order[own].iter().map(|at| &elements.all[*at as usize]) {
                 let share = element.shear / far.moduli.shear_pa as f32;
                 volume += f64::from(share);
                 let [a, b, c] = element.gradients;
@@ -262,14 +277,14 @@ impl Parts {
         self.order.clear();
         memory::fit(&mut self.order, elements.len(), WHAT)?;
         self.order.resize(elements.len(), 0);
-        for element in &elements.0 {
+        for element in &elements.all {
             self.ends[element.cluster as usize] += 1;
         }
         let mut start = 0;
         for end in &mut self.ends {
             start += std::mem::replace(end, start);
         }
-        for (at, element) in elements.0.iter().enumerate() {
+        for (at, element) in elements.all.iter().enumerate() {
             // The start of a cluster moves to its end while it is filled.
             let place = &mut self.ends[element.cluster as usize];
             self.order[*place as usize] = at as u32;
