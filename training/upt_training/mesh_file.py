@@ -41,7 +41,7 @@ class Mesh:
 
     @property
     def sha256(self) -> str:
-        """The mesh hash: SHA-256 of positions, tets, fixed, supported and, if any, stiffness, region and laws, and fibre."""
+        """The mesh hash: SHA-256 of positions, tets, fixed, supported and, if any, stiffness, region, laws, fibre."""
         digest = hashlib.sha256()
         for array in (self.positions, self.tets, self.fixed, self.supported, self.stiffness):
             digest.update(np.ascontiguousarray(array).tobytes())

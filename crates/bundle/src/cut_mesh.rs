@@ -44,26 +44,25 @@ impl Mesh {
         let most = self.tets.len() / 4 + new.len();
         let mut tets = memory::room(4 * most, WHAT)?;
         let mut stiffness = memory::room(most, WHAT)?;
-        let mut region = memory::room(most, WHAT)?;
-        let mut fibre = memory::room(if self.fibre.is_empty() { 0 } else { most }, WHAT)?;
         let ends = gone.iter().map(|element| *element as usize);
+        let ends = ends.chain([self.tets.len() / 4]);
         let mut start = 0;
-        for end in ends.chain([self.tets.len() / 4]) {
+        for end in ends.clone() {
             tets.extend_from_slice(&self.tets[4 * start..4 * end]);
             match self.stiffness.is_empty() {
                 true => stiffness.resize(stiffness.len() + end - start, 1.0),
                 false => stiffness.extend_from_slice(&self.stiffness[start..end]),
             }
-            region.extend(self.region.iter().take(end).skip(start));
-            fibre.extend(self.fibre.iter().take(end).skip(start));
             start = end + 1;
         }
         for element in new {
             tets.extend(element.nodes);
             stiffness.push(self.stiffness_of(element));
-            region.extend(self.region.get(element.parent as usize));
-            fibre.extend(self.fibre.get(element.parent as usize));
         }
+        let starts = std::iter::once(0).chain(gone.iter().map(|element| *element as usize + 1));
+        let kept = starts.zip(ends).map(|(start, end)| start..end);
+        let parents = new.iter().map(|element| element.parent as usize);
+        let runs = kept.chain(parents.map(|parent| parent..parent + 1));
         let skin = body.skin()?;
         let touchable = body.touchable_of(self.domain_sides(body)?, &skin)?;
         let domain_faces = memory::copied(touchable.faces.as_flattened(), WHAT)?;
@@ -99,9 +98,7 @@ impl Mesh {
             positions,
             tets,
             stiffness,
-            region,
-            laws: memory::collected(self.laws.len(), self.laws.iter().cloned(), WHAT)?,
-            fibre,
+            laws: self.laws.gathered(most, runs)?,
             surface_faces: memory::copied(&self.surface_faces, WHAT)?,
             domain_nodes,
             domain_faces,

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use sha2::{Digest, Sha256};
 
 use super::files::hex;
+use super::laws::LawTable;
 use super::manifest::Boundary;
 use super::node_set::NodeSet;
 use super::tensors::TensorFile;
@@ -25,12 +26,8 @@ pub struct Mesh {
     pub tets: Vec<u32>,
     /// Young's modulus of each tetrahedron over the material's `[T]`; empty where the body is uniform.
     pub stiffness: Vec<f32>,
-    /// Number of each tetrahedron's law `[T]`, see [`elements::Laws`]; empty where the body has the material's.
-    pub region: Vec<u8>,
-    /// Regions with a law of their own.
-    pub laws: Vec<elements::Region>,
-    /// Directions of the tetrahedra's fibres at rest `[T]`, unit vectors or zero; empty where the body has none.
-    pub fibre: Vec<[f32; 3]>,
+    /// Laws of its regions, and directions of fibres.
+    pub laws: LawTable,
     /// Boundary triangles `[F,3]`, outward.
     pub surface_faces: Vec<u32>,
     /// Triangles of the domain `[D,3]`; of a cut body those that are whole.
@@ -121,7 +118,7 @@ impl Mesh {
             let problem = format!("element {tet} is {}, must be positive", stiffness[tet]);
             return Err(file.bad("stiffness", problem));
         }
-        let (region, laws, fibre) = super::laws::read(file, tets.len() / 4)?;
+        let laws = super::laws::read(file, tets.len() / 4)?;
         let surface_faces = file.indices("surface", &[None, Some(3)], count)?;
         let domain = if file.has("domain") {
             file.indices("domain", &[None], surface_faces.len() / 3)?
@@ -174,9 +171,7 @@ impl Mesh {
             positions,
             tets,
             stiffness,
-            region,
             laws,
-            fibre,
             surface_faces,
             domain_faces,
             sha256: hex(&hash.finalize()),
@@ -192,11 +187,7 @@ impl Mesh {
             positions: self.positions.as_chunks().0,
             tets: self.tets.as_chunks().0,
             stiffness: &self.stiffness,
-            laws: elements::Laws {
-                of_tet: &self.region,
-                regions: &self.laws,
-                fibre: &self.fibre,
-            },
+            laws: self.laws.view(),
         }
     }
 

@@ -1,6 +1,5 @@
 //! Directions of fibres, packed as the clusters are.
 
-use crate::partition::{Chunk, Partition};
 use crate::vector::dot;
 use lanes::WIDTH;
 
@@ -66,27 +65,5 @@ impl<const TETS: usize> Directions<TETS> {
             }
             self.volume[tet][at] = 0.0;
         }
-    }
-}
-
-impl Partition {
-    /// Whether any law has fibres.
-    pub(crate) fn has_fibres(&self) -> bool {
-        std::iter::once(&self.moduli.law)
-            .chain(&self.laws)
-            .any(|law| law.fibres().is_some())
-    }
-
-    /// The directions of the fibres of a chunk's batches; empty where no law has fibres.
-    #[inline(always)]
-    pub fn directions(
-        &self,
-        chunk: &Chunk,
-    ) -> (&[Directions<4>], &[Directions<2>], &[Directions<1>]) {
-        (
-            self.octahedra.directions_of(&chunk.octahedra),
-            self.pairs.directions_of(&chunk.pairs),
-            self.singles.directions_of(&chunk.singles),
-        )
     }
 }

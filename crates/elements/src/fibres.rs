@@ -1,54 +1,65 @@
 //! What fibres add to the stress, the energy and the tangent of their matrix, in f64 ([`crate::Fibred`] has the equations).
 
 use crate::laws::Fibred;
-use crate::material::Moduli;
-use crate::tetrahedron::{Deformation, Tetrahedron};
 use crate::vector::dot;
 
-/// The fibres of a deformed element: `F a`, and `x = |F a|² - |a|²`. None where the element has no direction.
-pub(crate) fn stretched(state: &Deformation) -> Option<([f64; 3], f64)> {
-    let own = dot(state.fibre, state.fibre);
-    if own == 0.0 {
-        return None;
+/// The fibres of a deformed element.
+#[derive(Clone, Copy)]
+pub(crate) struct Stretched {
+    /// Their direction at rest.
+    pub a: [f64; 3],
+    /// `F a`.
+    pub image: [f64; 3],
+    /// `|F a|² - |a|²`.
+    pub x: f64,
+}
+
+impl Stretched {
+    /// Of a deformation gradient, rows; none where there is no direction.
+    pub fn of(f: &[[f64; 3]; 3], a: [f64; 3]) -> Option<Self> {
+        let own = dot(a, a);
+        if own == 0.0 {
+            return None;
+        }
+        let image = f.map(|row| dot(row, a));
+        let x = dot(image, image) - own;
+        Some(Self { a, image, x })
     }
-    let image = state.f.map(|row| dot(row, state.fibre));
-    Some((image, dot(image, image) - own))
 }
 
 /// Adds `2 psi'(x) F a (x) a`, Pa.
 pub(crate) fn add_stress(
     fibres: &Fibred,
-    state: &Deformation,
+    own: Option<Stretched>,
     shear_pa: f64,
     out: &mut [[f64; 3]; 3],
 ) {
-    let Some((image, x)) = stretched(state).filter(|(_, x)| *x > 0.0) else {
+    let Some(Stretched { a, image, x }) = own.filter(|own| own.x > 0.0) else {
         return;
     };
     let pull = 2.0 * shear_pa * fibres.pull(x);
     for (row, image) in out.iter_mut().zip(image) {
-        for (sum, a) in row.iter_mut().zip(state.fibre) {
+        for (sum, a) in row.iter_mut().zip(a) {
             *sum += pull * image * a;
         }
     }
 }
 
 /// `psi / mu`.
-pub(crate) fn energy(fibres: &Fibred, state: &Deformation) -> f64 {
-    stretched(state).map_or(0.0, |(_, x)| fibres.stored(x))
+pub(crate) fn energy(fibres: &Fibred, own: Option<Stretched>) -> f64 {
+    own.map_or(0.0, |own| fibres.stored(own.x))
 }
 
 /// Adds `2 psi' delta_ik a_j a_l + 4 psi'' (F a)_i a_j (F a)_k a_l`, Pa, in row `3 i + j`, column `3 k + l`.
 pub(crate) fn add_tangent(
     fibres: &Fibred,
-    state: &Deformation,
+    own: Option<Stretched>,
     shear_pa: f64,
     out: &mut [[f64; 9]; 9],
 ) {
-    let Some((image, x)) = stretched(state).filter(|(_, x)| *x > 0.0) else {
+    let Some(Stretched { a, image, x }) = own.filter(|own| own.x > 0.0) else {
         return;
     };
-    let a = state.fibre;
     let (pull, rise) = (
         2.0 * shear_pa * fibres.pull(x),
         4.0 * shear_pa * fibres.rise(x),
@@ -66,15 +77,15 @@ pub(crate) fn add_tangent(
 /// Adds the same of an element between its corners, times `weight`, µN/mm.
 pub(crate) fn add_stiffness(
     fibres: &Fibred,
-    state: &Deformation,
+    own: Option<Stretched>,
     (shear_pa, volume): (f64, f64),
     gradients: [[f64; 3]; 4],
     out: &mut [[f64; 12]; 12],
 ) {
-    let Some((image, x)) = stretched(state).filter(|(_, x)| *x > 0.0) else {
+    let Some(Stretched { a, image, x }) = own.filter(|own| own.x > 0.0) else {
         return;
     };
-    let along = gradients.map(|g| dot(g, state.fibre));
+    let along = gradients.map(|g| dot(g, a));
     let (pull, rise) = (
         2.0 * shear_pa * volume * fibres.pull(x),
         4.0 * shear_pa * volume * fibres.rise(x),
@@ -90,18 +101,6 @@ pub(crate) fn add_stiffness(
             }
         }
     }
-}
-
-/// The largest eigenvalue of what fibres add to the stiffness of an element, over its volume, Pa/mm², from the gradients of its four shape functions: of
-/// slack fibres what they add as soon as they are taut.
-pub fn stiffest_pull(gradients: &[[f64; 3]; 4], state: &Deformation, moduli: &Moduli) -> f64 {
-    let (Some(fibres), Some((image, x))) = (moduli.law.fibres(), stretched(state)) else {
-        return 0.0;
-    };
-    let x = x.max(0.0);
-    let own = 4.0 * fibres.rise(x) * dot(image, image) + 2.0 * fibres.pull(x);
-    let along = gradients.iter().map(|g| dot(*g, state.fibre));
-    moduli.shear_pa * own * along.map(|b| b * b).sum::<f64>()
 }
 
 /// Adds the stress that fibres of several directions have at one deformation gradient, Pa: with their mean structure tensor `M = sum v a (x) a / sum v` they pull
@@ -126,23 +125,6 @@ pub fn add_mean_stress(
     for (row, image) in out.iter_mut().zip(image) {
         for (sum, value) in row.iter_mut().zip(image) {
             *sum += pull * value;
-        }
-    }
-}
-
-impl Deformation {
-    /// The same with the direction of fibres at rest: a unit vector, or zero for none.
-    pub fn along(self, fibre: [f64; 3]) -> Self {
-        Self { fibre, ..self }
-    }
-}
-
-impl Tetrahedron {
-    /// The same with the direction of its fibres at rest: a unit vector, or zero for none.
-    pub fn along(self, fibre: [f32; 3]) -> Self {
-        Self {
-            fibre: fibre.map(f64::from),
-            ..self
         }
     }
 }

@@ -19,6 +19,7 @@ mod cut;
 mod directions;
 mod dispatch;
 mod fault;
+mod fibre_rows;
 mod fibres;
 mod gradients;
 mod history;
@@ -44,7 +45,7 @@ pub use batches::{Element, Kind, PADDING, shape_gradients};
 pub use cut::CutTetrahedra;
 pub use dispatch::Kernels;
 pub use fault::MaterialError;
-pub use fibres::{add_mean_stress, stiffest_pull};
+pub use fibres::add_mean_stress;
 pub use history::StressHistory;
 pub use internal_forces::{ElementForces, ParallelFor, Scratch};
 pub use kernel::flops;
@@ -60,7 +61,7 @@ pub use relaxation::{Branch, MOST_BRANCHES, Relaxation};
 pub use slots::{FLOPS_PER_NODE, PADDED};
 pub use stress_step::{HistoryStep, StressStep};
 pub use subset::Subset;
-pub use tangent::tangent;
+pub use tangent::{stiffest_pull, tangent};
 pub use tetrahedra::Tetrahedra;
 pub use tetrahedron::{
     Deformation, Tetrahedron, energy_density, inverse_cube_root, shape_energy, stiffening, stress,

@@ -23,7 +23,7 @@ type Matrix = [[f64; 3]; 3];
 pub fn tangent(state: &Deformation, moduli: Moduli) -> [[f64; 9]; 9] {
     let mut sum = tangent_with(state, moduli, 1.0);
     if let Some(own) = moduli.law.fibres() {
-        fibres::add_tangent(own, state, moduli.shear_pa, &mut sum);
+        fibres::add_tangent(own, state.fibres(), moduli.shear_pa, &mut sum);
     }
     sum
 }
@@ -166,6 +166,18 @@ fn from_principal(vectors: &Matrix, entry: impl Fn(usize, usize) -> f64) -> Matr
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| vectors[i][k] * half[k][j]).sum()))
 }
 
+/// The largest eigenvalue of what fibres add to the stiffness of an element, over its volume, Pa/mm², from the gradients of its four shape functions: of
+/// slack fibres what they add as soon as they are taut.
+pub fn stiffest_pull(gradients: &[[f64; 3]; 4], state: &Deformation, moduli: &Moduli) -> f64 {
+    let (Some(fibres), Some(own)) = (moduli.law.fibres(), state.fibres()) else {
+        return 0.0;
+    };
+    let x = own.x.max(0.0);
+    let slope = 4.0 * fibres.rise(x) * dot(own.image, own.image) + 2.0 * fibres.pull(x);
+    let along = gradients.iter().map(|g| dot(*g, own.a));
+    moduli.shear_pa * slope * along.map(|b| b * b).sum::<f64>()
+}
+
 impl Tetrahedron {
     /// Derivatives of [`Tetrahedron::forces`] by the corners' displacements, µN/mm: entry `[3 a + i][3 b + j]` of corners `a`, `b` and
     /// axes `i`, `j`; symmetric. At rest its diagonal blocks are [`Tetrahedron::diagonal_blocks`].
@@ -191,7 +203,7 @@ impl Tetrahedron {
         };
         if let Some(own) = moduli.law.fibres() {
             let weight = (moduli.shear_pa, self.volume);
-            fibres::add_stiffness(own, state, weight, gradients, &mut sum);
+            fibres::add_stiffness(own, state.fibres(), weight, gradients, &mut sum);
         }
         sum
     }

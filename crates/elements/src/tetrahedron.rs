@@ -5,7 +5,7 @@
 //! `P = F S = mu J^(-2/3) (F - I1/(3 J) cof F) + kappa (J - 1) cof F`, which is
 //! `S = mu J^(-2/3) (I - I1/3 C^-1) + kappa J (J - 1) C^-1`. Lengths are mm, moduli Pa: energies nJ, forces µN.
 
-use crate::fibres;
+use crate::fibres::{self, Stretched};
 use crate::laws::{Invariants, Isochoric, Law};
 use crate::material::Moduli;
 use crate::principal::{self, PLACE};
@@ -57,6 +57,14 @@ impl Tetrahedron {
             volume: six_volumes / 6.0 * stiffness,
             gradients: normals.map(|n| n.map(|x| x / six_volumes)),
             fibre: [0.0; 3],
+        }
+    }
+
+    /// The same with the direction of its fibres at rest: a unit vector, or zero for none.
+    pub fn along(self, fibre: [f32; 3]) -> Self {
+        Self {
+            fibre: fibre.map(f64::from),
+            ..self
         }
     }
 
@@ -119,6 +127,16 @@ impl Deformation {
         }
     }
 
+    /// The same with the direction of fibres at rest: a unit vector, or zero for none.
+    pub fn along(self, fibre: [f64; 3]) -> Self {
+        Self { fibre, ..self }
+    }
+
+    /// Its fibres; none where it has no direction.
+    pub(crate) fn fibres(&self) -> Option<Stretched> {
+        Stretched::of(&self.f, self.fibre)
+    }
+
     /// `I1`, `I2` and `det^(-1/3)`, where `det` stands for `det F`.
     pub fn invariants(&self, det: f64) -> Invariants {
         Invariants {
@@ -142,7 +160,7 @@ pub fn stress(state: &Deformation, moduli: Moduli) -> [[f64; 3]; 3] {
         Law::VerondaWestmann(law) => stress_by_invariants(law, state, moduli),
         Law::Fibred(own) => {
             let mut sum = stress(state, moduli.without_fibres());
-            fibres::add_stress(&own, state, moduli.shear_pa, &mut sum);
+            fibres::add_stress(&own, state.fibres(), moduli.shear_pa, &mut sum);
             sum
         }
     }
@@ -200,7 +218,7 @@ pub fn shape_energy(state: &Deformation, law: Law, det: f64) -> f64 {
         Law::Yeoh(law) => law.energy(state.invariants(det)),
         Law::VerondaWestmann(law) => law.energy(state.invariants(det)),
         Law::Fibred(own) => {
-            shape_energy(state, own.matrix.into(), det) + fibres::energy(&own, state)
+            shape_energy(state, own.matrix.into(), det) + fibres::energy(&own, state.fibres())
         }
     }
 }

@@ -1,15 +1,7 @@
 //! `--fibre [NAME=]X,Y,Z`: the direction of the fibres of a region, or of the whole body.
 
 use std::fmt;
-use std::path::Path;
 use std::str::FromStr;
-
-use anyhow::{Result, bail};
-use tissue::mesh::Mesh;
-
-use super::laws::tets_of;
-use super::options::Options;
-use super::stages::Stage;
 
 /// A direction at rest, and the region whose tetrahedra have it.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,35 +46,6 @@ impl fmt::Display for Fibre {
         let [x, y, z] = self.direction;
         write!(to, "{x},{y},{z}")
     }
-}
-
-/// Gives tetrahedra their directions; those of the mesh file stay where no option names them.
-pub fn apply(
-    mesh: &mut Mesh,
-    options: &Options,
-    from: (&Path, f64),
-    stage: &mut Stage,
-) -> Result<()> {
-    for own in &options.fibre {
-        let (rows, what) = match &own.name {
-            None => ((0..mesh.tets.len()).collect(), String::from("the body")),
-            Some(name) => (
-                tets_of(mesh, options, from, name)?,
-                format!("region `{name}`"),
-            ),
-        };
-        if rows.is_empty() {
-            bail!("no tetrahedron lies in {what} of --fibre {own}");
-        }
-        mesh.fibre.resize(mesh.tets.len(), [0.0; 3]);
-        rows.iter().for_each(|&row| mesh.fibre[row] = own.direction);
-        let [x, y, z] = own.direction;
-        stage.decided(&format!(
-            "{} tetrahedra of {what} have fibres along {x:.3}, {y:.3}, {z:.3}",
-            rows.len()
-        ));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! `--material REGION=LAW`: regions with a law of their own.
+//! `--material REGION=LAW`: regions with a law of their own; `--fibre REGION=X,Y,Z`: directions of fibres.
 
 use std::path::Path;
 
@@ -7,7 +7,6 @@ use elements::{MOST_REGIONS, Material, Region as LawRegion};
 use tissue::mesh::Mesh;
 use tissue::mesh_import::{Region, tets_in};
 
-use super::fibres;
 use super::material::Choice;
 use super::options::Options;
 use super::stages::Stage;
@@ -25,7 +24,7 @@ pub fn apply(
             Choice::Numbers(_) => None,
         })
         .collect();
-    fibres::apply(mesh, options, (input, scale), stage)?;
+    give_directions(mesh, options, (input, scale), stage)?;
     let has_fibres =
         |name: &str| (options.fibre.iter()).any(|own| own.name.as_deref() == Some(name));
     for region in &options.region {
@@ -67,8 +66,37 @@ pub fn apply(
     Ok(())
 }
 
+/// Gives tetrahedra their directions; those of the mesh file stay where no option names them.
+fn give_directions(
+    mesh: &mut Mesh,
+    options: &Options,
+    from: (&Path, f64),
+    stage: &mut Stage,
+) -> Result<()> {
+    for own in &options.fibre {
+        let (rows, what) = match &own.name {
+            None => ((0..mesh.tets.len()).collect(), String::from("the body")),
+            Some(name) => (
+                tets_of(mesh, options, from, name)?,
+                format!("region `{name}`"),
+            ),
+        };
+        if rows.is_empty() {
+            bail!("no tetrahedron lies in {what} of --fibre {own}");
+        }
+        mesh.fibre.resize(mesh.tets.len(), [0.0; 3]);
+        rows.iter().for_each(|&row| mesh.fibre[row] = own.direction);
+        let [x, y, z] = own.direction;
+        stage.decided(&format!(
+            "{} tetrahedra of {what} have fibres along {x:.3}, {y:.3}, {z:.3}",
+            rows.len()
+        ));
+    }
+    Ok(())
+}
+
 /// The tetrahedra of a region by name: as `--region` has it, else as the mesh file has it, else a group of the input.
-pub(super) fn tets_of(
+fn tets_of(
     mesh: &Mesh,
     options: &Options,
     (input, scale): (&Path, f64),

@@ -212,7 +212,9 @@ fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
         "--region",
         "rind=plane:0,0,1,-12",
         "--material",
-        "rind=cortex~0.25,0.05,0.4,0.5",
+        "rind=cortex+fibres:2,1~0.25,0.05,0.4,0.5",
+        "--fibre",
+        "rind=3,4,0",
     ];
     let asked = [
         &law[..],
@@ -236,8 +238,9 @@ fn an_organ_of_another_law_that_relaxes_is_corrected_by_that_law() {
     let rind = &manifest["laws"][0];
     assert_eq!(
         (&rind["name"], &rind["law"]["name"]),
-        (&"rind".into(), &"ogden".into())
+        (&"rind".into(), &"fibres".into())
     );
+    assert_eq!(rind["law"]["matrix"]["name"], "ogden");
     assert!(
         rind["source"].as_str().unwrap().starts_with("10.1016/"),
         "{rind}"

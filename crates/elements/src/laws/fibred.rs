@@ -11,7 +11,6 @@
 //!
 //! REQ-099: Fibres pull where they are longer than at rest, and do nothing where they are shorter.
 
-use super::Law;
 use super::mooney_rivlin::MooneyRivlin;
 use super::neo_hookean::NeoHookean;
 use super::ogden::{CAP, Ogden};
@@ -19,7 +18,6 @@ use super::veronda_westmann::VerondaWestmann;
 use super::yeoh::Yeoh;
 use crate::fault::MaterialError;
 use serde::{Deserialize, Serialize};
-use std::fmt;
 
 /// `k1 / mu` at most.
 const MOST_K1: f64 = 1e3;
@@ -38,42 +36,15 @@ pub struct Fibred {
     pub matrix: Matrix,
 }
 
-/// An isotropic law: any [`Law`] but one with fibres. In files as the law.
+/// An isotropic law: any [`crate::Law`] but one with fibres. In files as the law.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Law", into = "Law")]
+#[serde(tag = "name", rename_all = "kebab-case")]
 pub enum Matrix {
     NeoHookean(NeoHookean),
     MooneyRivlin(MooneyRivlin),
     Ogden(Ogden),
     Yeoh(Yeoh),
     VerondaWestmann(VerondaWestmann),
-}
-
-impl TryFrom<Law> for Matrix {
-    type Error = String;
-
-    fn try_from(law: Law) -> Result<Self, String> {
-        match law {
-            Law::NeoHookean(law) => Ok(Self::NeoHookean(law)),
-            Law::MooneyRivlin(law) => Ok(Self::MooneyRivlin(law)),
-            Law::Ogden(law) => Ok(Self::Ogden(law)),
-            Law::Yeoh(law) => Ok(Self::Yeoh(law)),
-            Law::VerondaWestmann(law) => Ok(Self::VerondaWestmann(law)),
-            Law::Fibred(_) => Err("the matrix of fibres has fibres: use an isotropic law".into()),
-        }
-    }
-}
-
-impl From<Matrix> for Law {
-    fn from(matrix: Matrix) -> Self {
-        match matrix {
-            Matrix::NeoHookean(law) => Self::NeoHookean(law),
-            Matrix::MooneyRivlin(law) => Self::MooneyRivlin(law),
-            Matrix::Ogden(law) => Self::Ogden(law),
-            Matrix::Yeoh(law) => Self::Yeoh(law),
-            Matrix::VerondaWestmann(law) => Self::VerondaWestmann(law),
-        }
-    }
 }
 
 impl Fibred {
@@ -120,6 +91,7 @@ impl Fibred {
         self.k1_over_mu * self.growth(within) * slope
     }
 
+    /// The constant of the fibres themselves that is not admitted.
     pub(super) fn fault(&self) -> Option<MaterialError> {
         if !(self.k1_over_mu > 0.0 && self.k1_over_mu <= MOST_K1) {
             return MaterialError::some(
@@ -131,27 +103,16 @@ impl Fibred {
         if !(0.0..=MOST_K2).contains(&self.k2) {
             return MaterialError::some("law.k2", self.k2, "from 0 to 1000");
         }
-        Law::from(self.matrix).fault()
+        None
     }
 
-    /// From `K1/MU,K2` and a matrix.
-    pub(super) fn parse(constants: &str, matrix: Law) -> Result<Self, String> {
+    /// `k1 / mu` and `k2` from `K1/MU,K2`.
+    pub(super) fn parse(constants: &str) -> Result<[f64; 2], String> {
         let fault = || {
             format!("law fibres: `{constants}` must be K1/MU,K2: k1 over the shear modulus, and k2")
         };
         let (k1, k2) = constants.split_once(',').ok_or_else(fault)?;
         let number = |text: &str| text.trim().parse().map_err(|_| fault());
-        Ok(Self {
-            k1_over_mu: number(k1)?,
-            k2: number(k2)?,
-            matrix: matrix.try_into()?,
-        })
-    }
-}
-
-impl fmt::Display for Fibred {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        Law::from(self.matrix).fmt(f)?;
-        write!(f, "+fibres:{},{}", self.k1_over_mu, self.k2)
+        Ok([number(k1)?, number(k2)?])
     }
 }

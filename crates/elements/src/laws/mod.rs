@@ -17,6 +17,7 @@ mod fibred;
 mod grows;
 mod growth;
 mod isochoric;
+mod matrix;
 mod mooney_rivlin;
 mod neo_hookean;
 mod ogden;
@@ -180,7 +181,7 @@ impl Law {
             Self::Ogden(law) => law.fault(),
             Self::Yeoh(law) => law.fault(),
             Self::VerondaWestmann(law) => law.fault(),
-            Self::Fibred(law) => law.fault(),
+            Self::Fibred(law) => law.fault().or_else(|| Self::from(law.matrix).fault()),
         }
     }
 }
@@ -196,7 +197,10 @@ impl fmt::Display for Law {
             Self::Ogden(law) => law.fmt(f),
             Self::Yeoh(law) => write!(f, "yeoh:{},{}", law.c2_over_c1, law.c3_over_c1),
             Self::VerondaWestmann(law) => write!(f, "veronda-westmann:{}", law.beta),
-            Self::Fibred(law) => law.fmt(f),
+            Self::Fibred(law) => {
+                Self::from(law.matrix).fmt(f)?;
+                write!(f, "+fibres:{},{}", law.k1_over_mu, law.k2)
+            }
         }
     }
 }
@@ -211,7 +215,14 @@ impl FromStr for Law {
             None => (Self::default(), text.strip_prefix("fibres:")),
         };
         if let Some(fibres) = fibres {
-            return Self::Fibred(Fibred::parse(fibres, matrix)?).checked();
+            let [k1_over_mu, k2] = Fibred::parse(fibres)?;
+            let matrix = matrix.try_into()?;
+            return Self::Fibred(Fibred {
+                k1_over_mu,
+                k2,
+                matrix,
+            })
+            .checked();
         }
         let (name, constant) = match text.split_once(':') {
             None => (text, None),

@@ -210,7 +210,7 @@ impl Corrections {
             positions: cut.positions.as_chunks().0,
             tets: intact.tets.as_chunks().0,
             stiffness: &intact.stiffness,
-            fibre: &intact.fibre,
+            fibre: &intact.laws.fibre,
             changed: &changes.gone,
             cells: &cells,
         };

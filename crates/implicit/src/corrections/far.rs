@@ -184,13 +184,13 @@ impl FarField {
             cluster_of: memory::filled(mesh.tets.len() / 4, 0, WHAT)?,
             edge_mm: 0.0,
         };
-        if !mesh.laws.is_empty() {
+        if !mesh.laws.regions.is_empty() {
             // Chunks have one law, and so have clusters.
             own.group = 1;
             let laws = (0..count).map(|chunk| elements.moduli_of(chunk).law);
             own.laws.laws = memory::collected(count, laws, WHAT)?;
         }
-        if !mesh.fibre.is_empty() {
+        if !mesh.laws.fibre.is_empty() {
             own.laws.structure = memory::filled(count.div_ceil(own.group), [[0.0; 3]; 3], WHAT)?;
         }
         for chunk in 0..count {

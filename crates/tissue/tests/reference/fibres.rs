@@ -129,7 +129,7 @@ fn a_block_is_pulled_and_pressed_as_the_closed_form() {
             assert!(error < 2e-4, "{law}, {z}, {along}: {error} mm");
 
             let (force, field) = settled(&mesh, material, &start);
-            let wanted = 1e-3 * pa * f64::from(SIDE * SIDE);
+            let wanted = -1e-3 * pa * f64::from(SIDE * SIDE);
             assert!(
                 (force - wanted).abs() < 0.005 * wanted.abs(),
                 "{law}, {z}, {along}: {force} mN for {wanted}"
@@ -152,7 +152,7 @@ fn a_block_that_is_cut_along_its_fibres_pulls_as_before() {
     let pulled = |cut: bool| {
         let mut solver = Solver::new(&mesh, Boundary::Fixed, options.clone()).unwrap();
         if cut {
-            let edge = |y: f64| vec![[3.1, y, 2.0], [3.1, y, f64::from(HEIGHT) - 2.0]];
+            let edge = |y: f64| vec![[3.1, y, 5.0], [3.1, y, f64::from(HEIGHT) - 5.0]];
             let sweep = Sweep::new(&[edge(-2.0), edge(f64::from(SIDE) + 2.0)]).unwrap();
             solver.cut(&sweep, 0).unwrap();
         }
