@@ -1,5 +1,10 @@
 //! Fibres in a matrix, in f64: energy, stress, tangent, closed forms, and what is refused.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "components of tensors read best by index"
+)]
+
 use elements::vector::dot;
 use elements::{
     Deformation, Fibred, Law, Laws, Material, Moduli, Region, Tetrahedron, add_mean_stress,
