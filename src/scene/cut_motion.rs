@@ -58,6 +58,7 @@ impl Corrector {
             relaxing: None,
         };
         self.solver.restore(context, &history)?;
+        self.solver.follow_set(context, &old.solver)?;
         if !self.solver.relaxes() {
             return Ok(());
         }

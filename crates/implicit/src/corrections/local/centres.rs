@@ -31,6 +31,44 @@ pub(super) fn is_by(rest: &[f32], nodes: &[u32], node: u32, distance: f32) -> bo
     })
 }
 
+/// What of a box lies within a distance of some nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Reached {
+    Nothing,
+    Part,
+    /// All of it by one of the nodes.
+    Whole,
+}
+
+/// What of a box, `[low, high]` of nodes at rest, lies within a distance of one of some nodes; where it is a part, `close` has the nodes that reach into it.
+///
+/// Sums and their order are those of [`is_by`], and rounding keeps what is farther from being nearer: both say the same of each node in the box.
+pub(super) fn reach_of(
+    (rest, nodes): (&[f32], &[u32]),
+    distance: f32,
+    [low, high]: &[[f32; 3]; 2],
+    close: &mut Vec<u32>,
+) -> Result<Reached> {
+    close.clear();
+    memory::fit(close, nodes.len(), WHAT)?;
+    let square = |apart: [f32; 3]| apart.iter().map(|x| x * x).sum::<f32>();
+    for &node in nodes {
+        let at = &rest[3 * node as usize..][..3];
+        let nearest = [0, 1, 2].map(|k| (low[k] - at[k]).max(at[k] - high[k]).max(0.0));
+        if square(nearest) < distance * distance {
+            let farthest = [0, 1, 2].map(|k| (at[k] - low[k]).max(high[k] - at[k]));
+            if square(farthest) < distance * distance {
+                return Ok(Reached::Whole);
+            }
+            close.push(node);
+        }
+    }
+    Ok(match close.is_empty() {
+        true => Reached::Nothing,
+        false => Reached::Part,
+    })
+}
+
 /// Adds those nodes that do not lie by one of the centres.
 pub(in crate::corrections) fn add_centres(
     rest: &[f32],

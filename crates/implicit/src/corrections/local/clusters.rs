@@ -15,10 +15,22 @@ use crate::memory::{self, HeldBytes};
 /// What a near set leaves of the clusters that it has a part of.
 #[derive(Default, HeldBytes)]
 pub(super) struct LeftOut {
-    /// Such clusters, ascending, and the volume of their far elements, mm³; zero where all are near.
-    volumes: Vec<(u32, f64)>,
-    /// `sum v grad Phi` over the far elements of those that have some, one after another `[9,r]`.
-    on_modes: Vec<f32>,
+    /// By cluster, ascending.
+    list: Vec<Left>,
+    /// The room of those that were left of other sets.
+    spare: Vec<Left>,
+}
+
+/// That of one cluster.
+#[derive(Default, HeldBytes)]
+struct Left {
+    cluster: u32,
+    /// Volume of the far elements, mm³; zero where all are near.
+    volume: f64,
+    /// `sum v grad Phi` over the *near* elements, `[9,r]`, and the weights at mesh nodes that it was made of: it follows from them alone, so where a
+    /// set that grows with a cut, or moves on with a tool, has the same of a cluster, it stands.
+    near: Vec<f32>,
+    weights: Vec<(u32, [f32; 3])>,
 }
 
 impl LeftOut {
@@ -32,27 +44,99 @@ impl LeftOut {
         near: &NearSet,
         room: &mut Room,
     ) -> Result<()> {
-        let size = NINE * env.space.count();
-        self.volumes.clear();
-        self.on_modes.clear();
-        memory::fit(&mut self.on_modes, size * near.parts.iter().count(), WHAT)?;
+        self.keep_those_of(near)?;
         for part in near.parts.iter() {
+            let at = self.place_of(part.cluster as u32)?;
+            let left = &mut self.list[at];
             let chunks = far.chunks_of(part.cluster);
             let whole: f64 = far.volumes[chunks].iter().sum();
             let volume = whole - part.volume;
             // What rounding leaves of a cluster is nothing.
-            let volume = if volume > 1e-4 * whole { volume } else { 0.0 };
-            memory::push(&mut self.volumes, (part.cluster as u32, volume), WHAT)?;
-            if volume == 0.0 {
-                continue;
+            left.volume = if volume > 1e-4 * whole { volume } else { 0.0 };
+            if left.volume > 0.0 {
+                left.take(env, near, near.parts.weights(part), room)?;
             }
-            let start = self.on_modes.len();
-            self.on_modes.resize(start + size, 0.0);
-            let own = &mut self.on_modes[start..];
-            add_chunks(far, part.cluster, own);
-            room.products_on_modes(env, near, near.parts.weights(part))?;
-            add(-1.0, &room.linear, own);
         }
+        Ok(())
+    }
+
+    /// Puts those of clusters of which the set has no part aside.
+    fn keep_those_of(&mut self, near: &NearSet) -> Result<()> {
+        memory::reserve(&mut self.spare, self.list.len(), WHAT)?;
+        let mut parts = near.parts.iter().peekable();
+        let (list, spare) = (&mut self.list, &mut self.spare);
+        spare.extend(list.extract_if(.., |left| {
+            while parts
+                .next_if(|part| part.cluster < left.cluster as usize)
+                .is_some()
+            {}
+            parts
+                .next_if(|part| part.cluster == left.cluster as usize)
+                .is_none()
+        }));
+        Ok(())
+    }
+
+    /// Where a cluster is in the list; a new one knows nothing.
+    fn place_of(&mut self, cluster: u32) -> Result<usize> {
+        match self
+            .list
+            .binary_search_by_key(&cluster, |left| left.cluster)
+        {
+            Ok(at) => Ok(at),
+            Err(at) => {
+                memory::reserve(&mut self.list, 1, WHAT)?;
+                let mut left = self.spare.pop().unwrap_or_default();
+                left.cluster = cluster;
+                left.weights.clear();
+                self.list.insert(at, left);
+                Ok(at)
+            }
+        }
+    }
+
+    /// Takes over what was made for the body before a cut; `keeps` tells of a node whether it is the one that it was.
+    pub fn follow(&mut self, before: &LeftOut, keeps: impl Fn(u32) -> bool) -> Result<()> {
+        self.list.clear();
+        memory::fit(&mut self.list, before.list.len(), WHAT)?;
+        let kept = before
+            .list
+            .iter()
+            .filter(|left| left.weights.iter().all(|(node, _)| keeps(*node)));
+        for left in kept {
+            self.list.push(Left {
+                cluster: left.cluster,
+                volume: left.volume,
+                near: memory::copied(&left.near, WHAT)?,
+                weights: memory::copied(&left.weights, WHAT)?,
+            });
+        }
+        Ok(())
+    }
+}
+
+impl Left {
+    /// Takes the near part of the cluster, of these weights by place.
+    fn take(
+        &mut self,
+        env: Env<'_>,
+        near: &NearSet,
+        weights: &[(u32, [f32; 3])],
+        room: &mut Room,
+    ) -> Result<()> {
+        let nodes = &near.places.nodes;
+        let by_node = weights
+            .iter()
+            .map(|(place, weight)| (nodes[*place as usize], *weight));
+        if !self.weights.is_empty() && self.weights.iter().copied().eq(by_node.clone()) {
+            return Ok(());
+        }
+        // Until the product is made there is nothing that it was made of.
+        self.weights.clear();
+        memory::fit(&mut self.weights, weights.len(), WHAT)?;
+        room.products_on_modes(env, near, weights)?;
+        memory::replace(&mut self.near, &room.linear, WHAT)?;
+        self.weights.extend(by_node);
         Ok(())
     }
 }
@@ -68,7 +152,7 @@ fn add_chunks(far: &FarField, cluster: usize, own: &mut [f32]) {
 #[derive(HeldBytes)]
 pub(super) struct Clusters {
     /// `sum v grad Phi` over the far elements of each cluster `[C,9,r]`, mm³ a mode's mm.
-    on_modes: Vec<f32>,
+    pub(super) on_modes: Vec<f32>,
     /// `0..9 C`.
     rows: Vec<u32>,
     /// Volume of the far elements, mm³; whether some of a cluster's elements are near.
@@ -100,29 +184,24 @@ impl Clusters {
     /// Takes what clusters have without what is near; the others are whole.
     pub fn take(&mut self, far: &FarField, left: &LeftOut) {
         let size = self.on_modes.len() / self.volumes.len().max(1);
-        let mut tables = left.on_modes.chunks_exact(size.max(1));
-        let mut cut = left.volumes.iter().peekable();
+        let mut cut = left.list.iter().peekable();
         for cluster in 0..self.volumes.len() {
             let own = &mut self.on_modes[cluster * size..][..size];
-            let left = cut.next_if(|(number, _)| *number as usize == cluster);
+            let left = cut.next_if(|left| left.cluster as usize == cluster);
             if left.is_none() && !self.is_cut[cluster] {
                 continue;
             }
             self.is_cut[cluster] = left.is_some();
+            self.volumes[cluster] = match left {
+                Some(left) => left.volume,
+                None => far.volumes[far.chunks_of(cluster)].iter().sum(),
+            };
             own.fill(0.0);
-            match left {
-                Some((_, volume)) => {
-                    self.volumes[cluster] = *volume;
-                    if *volume > 0.0
-                        && let Some(table) = tables.next()
-                    {
-                        own.copy_from_slice(table);
-                    }
-                }
-                None => {
-                    self.volumes[cluster] = far.volumes[far.chunks_of(cluster)].iter().sum();
-                    add_chunks(far, cluster, own);
-                }
+            if left.is_none_or(|left| left.volume > 0.0) {
+                add_chunks(far, cluster, own);
+            }
+            if let Some(left) = left.filter(|left| left.volume > 0.0) {
+                add(-1.0, &left.near, own);
             }
         }
     }

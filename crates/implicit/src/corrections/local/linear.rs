@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use ::elements::{Moduli, Tetrahedron};
 
+use super::places::Places;
 use crate::corrections::far::FarField;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
@@ -190,7 +191,7 @@ fn apply<'a>(elements: impl Iterator<Item = &'a Linear>, v: &[f32], out: &mut [f
 pub(super) struct Parts {
     /// By cluster, ascending.
     list: Vec<Part>,
-    /// `sum_e v_e grad N` of their free nodes, by place, mm².
+    /// `sum_e v_e grad N` of their free nodes, by place, mm²; those of a part by the number of the node in the mesh, whatever else is near.
     weights: Vec<(u32, [f32; 3])>,
     sums: Vec<[f32; 3]>,
     /// Places that a sum has been added to, a bit each.
@@ -212,8 +213,14 @@ pub(super) struct Part {
 }
 
 impl Parts {
-    /// Takes the parts of some elements, of which `free` nodes are free.
-    pub fn fill(&mut self, elements: &LinearElements, far: &FarField, free: usize) -> Result<()> {
+    /// Takes the parts of some elements, whose corners have these places.
+    pub fn fill(
+        &mut self,
+        elements: &LinearElements,
+        far: &FarField,
+        places: &Places,
+    ) -> Result<()> {
+        let free = places.free;
         self.list.clear();
         self.weights.clear();
         self.sums.clear();
@@ -259,6 +266,8 @@ impl Parts {
                     }
                 }
             }
+            let node = |place: u32| places.nodes[place as usize];
+            self.weights[start..].sort_unstable_by_key(|(place, _)| node(*place));
             let part = Part {
                 cluster,
                 volume,

@@ -241,6 +241,13 @@ impl LocalSolver {
         coming.published.fit(&coming.course)
     }
 
+    /// Takes over what was left of the clusters before a cut, where none of a cluster's nodes is a copy that the cut has made.
+    pub(super) fn follow_set(&mut self, before: &LocalSolver) -> Result<()> {
+        let count = before.set.near.places.node_count();
+        let keeps = |node: u32| (node as usize) < count;
+        self.set.left.follow(&before.set.left, keeps)
+    }
+
     /// Another boundary holds the body: what is near is made anew, and the factor, by whose number others know its columns.
     pub(super) fn leave_boundary(&mut self) {
         self.set.near.made = 0;

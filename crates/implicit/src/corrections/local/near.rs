@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use ::elements::{ElementForces, Subset};
 
-use super::centres::{is_by, nearest_squared};
+use super::centres::{Reached, is_by, nearest_squared, reach_of};
 use super::linear::{LinearElements, Parts, WHAT};
 use super::places::Places;
 use crate::corrections::extent::LEVELS;
@@ -63,6 +63,8 @@ struct Marks {
     counts: Vec<u16>,
     /// Of the near nodes from the nearest centre, squared, mm².
     distances: Vec<f32>,
+    /// The centres that reach into a chunk's box.
+    close: Vec<u32>,
 }
 
 /// The near elements with their law.
@@ -144,6 +146,7 @@ impl NearSet {
                 is_reached: memory::filled(count, false, WHAT)?,
                 counts: memory::filled(count, 0, WHAT)?,
                 distances: Vec::new(),
+                close: Vec::new(),
             },
             chosen: Chosen {
                 subset: memory::tried(Subset::new(&env.body.forces), WHAT)?,
@@ -193,7 +196,7 @@ impl NearSet {
             (env.held.is[node], !whole, !marks.is_reached[node])
         });
         self.elements.take_places(self.places.by_node());
-        self.parts.fill(&self.elements, far, self.places.free)?;
+        self.parts.fill(&self.elements, far, &self.places)?;
         self.blocks.all.refill(env, &self.places, |_| true)?;
         self.mark_around();
         let is_around = &self.marks.is_reached;
@@ -257,25 +260,15 @@ impl NearSet {
         self.chosen.is_near.resize(far.cluster_of.len(), false);
         self.chosen.subset.clear();
         let forces = &env.body.forces;
-        let is_reached = |node: u32| is_by(rest, &self.centres, node, reach);
-        let is_by_box = |[low, high]: &[[f32; 3]; 2]| {
-            self.centres.iter().any(|&node| {
-                let at = &rest[3 * node as usize..][..3];
-                let outside =
-                    |axis: usize| (low[axis] - at[axis]).max(at[axis] - high[axis]).max(0.0);
-                [0, 1, 2]
-                    .map(|axis| outside(axis).powi(2))
-                    .iter()
-                    .sum::<f32>()
-                    < reach * reach
-            })
-        };
         for (chunk, bounds) in far.packed.boxes.iter().enumerate() {
             self.far_share[chunk] = 1.0;
-            // Chunks whose box no centre reaches are not looked at node by node.
-            if is_by_box(bounds) {
+            // Chunks whose box no centre reaches are not looked at node by node, nor those that one reaches whole.
+            let close = &mut self.marks.close;
+            let reached = reach_of((rest, &self.centres), reach, bounds, close)?;
+            if reached != Reached::Nothing {
                 for &node in forces.chunk_nodes(chunk) {
-                    self.marks.is_reached[node as usize] = is_reached(node);
+                    self.marks.is_reached[node as usize] =
+                        reached == Reached::Whole || is_by(rest, close, node, reach);
                 }
                 let is_reached = &self.marks.is_reached;
                 let near =

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::path::Path;
 
-use super::centres::is_by;
+use super::centres::{Reached, is_by, reach_of};
 use super::columns::Response;
 use super::*;
 use crate::bundle::{BundleFiles, Mesh};
@@ -262,12 +262,49 @@ fn contact_has_the_compliance_of_the_preconditioner() {
     }
 }
 
-/// What is near, and a solve of its factor.
+/// A box of nodes says the same of each as the nodes do.
+#[test]
+fn what_is_reached_of_a_box_is_what_is_reached_of_its_nodes() {
+    let mut random = Random::new(3);
+    let (mut found, mut close) = ([0; 3], Vec::new());
+    for _ in 0..2000 {
+        let mut rest = random.normal(3 * 24, 8.0);
+        // The first eight lie about a place of their own.
+        let apart = random.normal(3, 20.0);
+        for at in rest[..24].as_chunks_mut::<3>().0 {
+            at.iter_mut()
+                .zip(&apart)
+                .for_each(|(x, apart)| *x = 0.5 * *x + apart);
+        }
+        let mut bounds = [[f32::MAX; 3], [f32::MIN; 3]];
+        for at in rest[..24].as_chunks::<3>().0 {
+            for axis in 0..3 {
+                bounds[0][axis] = bounds[0][axis].min(at[axis]);
+                bounds[1][axis] = bounds[1][axis].max(at[axis]);
+            }
+        }
+        let centres: Vec<u32> = (8..24).collect();
+        let reached = reach_of((&rest, &centres), 20.0, &bounds, &mut close).unwrap();
+        found[reached as usize] += 1;
+        for node in 0..8 {
+            let said = match reached {
+                Reached::Nothing => false,
+                Reached::Part => is_by(&rest, &close, node, 20.0),
+                Reached::Whole => true,
+            };
+            assert_eq!(said, is_by(&rest, &centres, node, 20.0));
+        }
+    }
+    assert!(found.iter().all(|count| *count > 50), "{found:?}");
+}
+
+/// What is near, and the bits of a solve of its factor and of what it leaves of the clusters.
 fn near_of(local: &mut LocalSolver) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
     let Set { near, factor, .. } = &mut local.set;
     let mut t = vec![1.0; 3 * near.places.core];
     factor.solve(Isa::detect(), &mut t);
-    let bits = t.iter().map(|x| x.to_bits()).collect();
+    let numbers = t.iter().chain(&local.clusters.on_modes);
+    let bits = numbers.map(|x| x.to_bits()).collect();
     (near.centres.clone(), near.places.nodes.clone(), bits)
 }
 
