@@ -5,7 +5,7 @@ use topology::{Element, origin};
 
 use super::body::SceneBody;
 use super::corrected::Corrector;
-use crate::corrections::{Course, History, Motion, SolverContext};
+use crate::corrections::{Course, History, Motion, SolverContext, follow_set};
 use crate::error::Result;
 use crate::memory;
 
@@ -58,7 +58,7 @@ impl Corrector {
             relaxing: None,
         };
         self.solver.restore(context, &history)?;
-        self.solver.follow_set(context, &old.solver)?;
+        follow_set(context, &old.solver, &mut self.solver)?;
         if !self.solver.relaxes() {
             return Ok(());
         }

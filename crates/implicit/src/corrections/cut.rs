@@ -14,7 +14,9 @@ use std::sync::{Arc, OnceLock};
 use ::elements::{CutTetrahedra, Material, Tetrahedron};
 use topology::{Body as CutBody, Changes};
 
-use super::local::add_centres;
+use super::input::SolverContext;
+use super::local::{LocalSolver, add_centres};
+use super::solver::ImplicitSolver;
 use super::time_step::{Diagonal, TimeStep, inverse};
 use super::{Body, Corrections};
 use crate::bundle::Mesh;
@@ -248,4 +250,23 @@ fn touched(body: &CutBody, changes: &Changes) -> Result<Vec<u32>> {
     touched.sort_unstable();
     touched.dedup();
     Ok(touched)
+}
+
+/// The solver of a cut body takes over what was made of the near set before the cut, as far as it holds for both. Nodes keep their numbers, copies have new
+/// ones.
+///
+/// # Errors
+/// [`crate::Error::OutOfMemory`].
+pub fn follow_set(
+    context: SolverContext<'_>,
+    before: &ImplicitSolver,
+    own: &mut ImplicitSolver,
+) -> Result<()> {
+    match &before.local {
+        Some(before) => {
+            let local = LocalSolver::made(&mut own.local, context)?;
+            local.set.follow(&before.set)
+        }
+        None => Ok(()),
+    }
 }

@@ -59,6 +59,7 @@ use whole::WholeModes;
 
 pub use body::Body;
 pub use boundary::Held;
+pub use cut::follow_set;
 pub use far::FarField;
 pub use group::Group;
 pub use history::{History, PAIRS};

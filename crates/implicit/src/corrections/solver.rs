@@ -89,22 +89,6 @@ impl ImplicitSolver {
         })
     }
 
-    /// Takes over what was made of the near set before the body was cut, as far as it holds for the cut body too. Nodes keep their numbers, copies have
-    /// new ones.
-    ///
-    /// # Errors
-    /// [`crate::Error::OutOfMemory`].
-    pub fn follow_set(
-        &mut self,
-        context: SolverContext<'_>,
-        before: &ImplicitSolver,
-    ) -> Result<()> {
-        match &before.local {
-            Some(before) => LocalSolver::made(&mut self.local, context)?.follow_set(before),
-            None => Ok(()),
-        }
-    }
-
     /// Back to rest.
     pub fn reset(&mut self) {
         self.motion.clear();

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use ::elements::{Moduli, Tetrahedron};
 
-use super::places::Places;
 use crate::corrections::far::FarField;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
@@ -213,14 +212,13 @@ pub(super) struct Part {
 }
 
 impl Parts {
-    /// Takes the parts of some elements, whose corners have these places.
+    /// Takes the parts of some elements, of which `free` nodes are free; by place `nodes` has their numbers in the mesh.
     pub fn fill(
         &mut self,
         elements: &LinearElements,
         far: &FarField,
-        places: &Places,
+        (nodes, free): (&[u32], usize),
     ) -> Result<()> {
-        let free = places.free;
         self.list.clear();
         self.weights.clear();
         self.sums.clear();
@@ -266,7 +264,7 @@ impl Parts {
                     }
                 }
             }
-            let node = |place: u32| places.nodes[place as usize];
+            let node = |place: u32| nodes[place as usize];
             self.weights[start..].sort_unstable_by_key(|(place, _)| node(*place));
             let part = Part {
                 cluster,

@@ -77,7 +77,7 @@ pub(super) struct Base<'a> {
 /// A scene's own part.
 #[derive(HeldBytes)]
 pub struct LocalSolver {
-    set: Set,
+    pub(super) set: Set,
     pub(super) coming: Coming,
     pub(super) pairs: Pairs,
     clusters: Clusters,
@@ -239,13 +239,6 @@ impl LocalSolver {
         coming.make_next((env, far, rest), u, room)?;
         // So that publishing it cannot fail.
         coming.published.fit(&coming.course)
-    }
-
-    /// Takes over what was left of the clusters before a cut, where none of a cluster's nodes is a copy that the cut has made.
-    pub(super) fn follow_set(&mut self, before: &LocalSolver) -> Result<()> {
-        let count = before.set.near.places.node_count();
-        let keeps = |node: u32| (node as usize) < count;
-        self.set.left.follow(&before.set.left, keeps)
     }
 
     /// Another boundary holds the body: what is near is made anew, and the factor, by whose number others know its columns.

@@ -196,7 +196,8 @@ impl NearSet {
             (env.held.is[node], !whole, !marks.is_reached[node])
         });
         self.elements.take_places(self.places.by_node());
-        self.parts.fill(&self.elements, far, &self.places)?;
+        let by_place = (self.places.nodes.as_slice(), self.places.free);
+        self.parts.fill(&self.elements, far, by_place)?;
         self.blocks.all.refill(env, &self.places, |_| true)?;
         self.mark_around();
         let is_around = &self.marks.is_reached;

@@ -51,6 +51,13 @@ impl Set {
         self.near.is_of(&choice.centres, choice.level as usize)
     }
 
+    /// Takes over what was left of the clusters before a cut, where none of a cluster's nodes is a copy that the cut has made.
+    pub fn follow(&mut self, before: &Set) -> Result<()> {
+        let count = before.near.places.node_count();
+        let keeps = |node: u32| (node as usize) < count;
+        self.left.follow(&before.left, keeps)
+    }
+
     /// Makes those of the first parts of a choice that there are not yet.
     pub(super) fn make(
         &mut self,
