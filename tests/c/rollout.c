@@ -32,8 +32,9 @@ int main(int argc, char **argv) {
   options.sleep = UPT_SWITCH_OFF;
   options.guard_policy = UPT_GUARD_REPORT;
   if (argc > 4) {
-    options.corrections.mode = UPT_CORRECTIONS_COUNT;
     options.corrections.count = (uint32_t)atoi(argv[4]);
+    options.corrections.mode =
+        options.corrections.count == 0 ? UPT_CORRECTIONS_NONE : UPT_CORRECTIONS_COUNT;
   }
   memset(&info, 0, sizeof info);
   info.struct_size = sizeof info;

@@ -79,7 +79,7 @@ compare() {
     return
   fi
   within "$2" "$corrected_tolerance" ""
-  roll "$1" "$2-plain" -1
+  roll "$1" "$2-plain" 0
   within "$2-plain" "$rollout_tolerance" ", without corrections"
 }
 
