@@ -3,7 +3,7 @@
  *
  *   rollout BUNDLE STEPS FILE [CORRECTIONS]        FILE: [STEPS,K,3] floats, mm
  *
- * With CORRECTIONS each step makes so many of them, whatever their error; -1: none.
+ * With CORRECTIONS each step makes so many of them, whatever their error; 0: none.
  */
 #include "expect.h"
 

@@ -38,7 +38,7 @@ pub(super) const SUNK_MM: f32 = 0.9;
 /// An iteration may leave it so deep, mm.
 const KEPT_MM: f32 = 0.5 * SUNK_MM;
 /// A needle, whose tip slides to other tissue, may be left so deep, mm.
-const KEPT_THIN_MM: f32 = 0.35 * SUNK_MM;
+const KEPT_THIN_MM: f32 = 0.28 * SUNK_MM;
 /// Tools that go less far in a step are followed in one part from the last state, mm.
 const LEAST_WAY_MM: f32 = 0.3;
 /// The response of linear elasticity is not shown where it goes farther than this, mm.
