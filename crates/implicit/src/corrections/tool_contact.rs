@@ -37,8 +37,6 @@ use crate::error::Result;
 pub(super) const SUNK_MM: f32 = 0.9;
 /// An iteration may leave it so deep, mm.
 const KEPT_MM: f32 = 0.5 * SUNK_MM;
-/// A needle, whose tip slides to other tissue, may be left so deep, mm.
-const KEPT_THIN_MM: f32 = 0.28 * SUNK_MM;
 /// Tools that go less far in a step are followed in one part from the last state, mm.
 const LEAST_WAY_MM: f32 = 0.3;
 /// The response of linear elasticity is not shown where it goes farther than this, mm.
@@ -349,15 +347,6 @@ fn sunk(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) ->
     match problem.next.is_wedged(&problem.past) {
         true => f32::MAX,
         false => problem.depths().sunk(state(input, u), way),
-    }
-}
-
-/// The same over what an iteration may leave.
-fn over_kept(input: &Input<'_>, problem: &mut ContactProblem, u: &[f32], way: f32) -> f32 {
-    let kept = [KEPT_MM, KEPT_THIN_MM];
-    match problem.next.is_wedged(&problem.past) {
-        true => f32::MAX,
-        false => problem.depths().over(state(input, u), way, kept),
     }
 }
 

@@ -14,15 +14,15 @@ use crate::error::Result;
 use crate::memory;
 
 impl LocalSolver {
-    /// One iteration with the tools at part `way` of their way; tells whether it led to another state. `over` says how deep tissue and tools lie in each other there, over what an
-    /// iteration may leave.
+    /// One iteration with the tools at part `way` of their way; tells whether it led to another state. `over` says how deep tissue and tools lie in each other there, over what a
+    /// part of the direction may leave.
     pub(in crate::corrections) fn improve(
         &mut self,
         step: &mut StepContext<'_>,
         problem: &mut ContactProblem,
         base: &[f32],
         way: f32,
-        over: impl Fn(&mut ContactProblem, &[f32]) -> f32,
+        over: impl Fn(&mut ContactProblem, &[f32], f32) -> f32,
     ) -> Result<bool> {
         let _span = tracing::trace_span!("iteration").entered();
         let env = step.context.env();
@@ -53,13 +53,13 @@ impl LocalSolver {
             // `d` is the direction until `accept` scales it: the slope is that of the line, not of the part.
             let slope_new = self.residuals.next.over(&self.d.step) - work;
             let left = match det > SMALLEST_DET {
-                true => over(problem, &self.residuals.trial),
+                true => over(problem, &self.residuals.trial, t),
                 false => f32::MAX,
             };
             // An iteration may not lose the contact, unless it had been lost.
             let is_kept = left <= 1.0 || {
                 self.place_at(base, 0.0);
-                left <= over(problem, &self.residuals.trial)
+                left <= over(problem, &self.residuals.trial, t)
             };
             match search.judge(is_kept, slope_new) {
                 Tried::Accepted => {

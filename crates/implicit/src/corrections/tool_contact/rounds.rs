@@ -1,15 +1,21 @@
 //! The iterations of a step, in rounds: each from a base whose residual is known everywhere.
 
 use super::thrown::has_thrown;
-use super::{Iterate, ToolStep, is_sound, is_spent, over_kept};
+use super::{Iterate, KEPT_MM, SUNK_MM, ToolStep, is_sound, is_spent, state};
 use crate::contact::ContactProblem;
 
 use crate::corrections::estimate::{EXCUSED, EXCUSED_IN_CUT};
+use crate::corrections::input::Input;
 use crate::corrections::local::{Base, LocalSolver, StepContext};
 use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
 use crate::memory;
 
+/// A needle, whose tip slides to other tissue, may be left so deep, mm; and so deep by a short part of a direction, which else would lead nowhere.
+const KEPT_THIN_MM: f32 = 0.28 * SUNK_MM;
+const KEPT_THIN_SHORT_MM: f32 = 1.12 * KEPT_THIN_MM;
+/// A part of a direction is short below this.
+const SHORT: f32 = 0.25;
 /// Iterations from one base at most: the far field is that of the base, in all but its clusters.
 const ROUND: u32 = 16;
 
@@ -191,7 +197,8 @@ impl ToolStep<'_> {
     pub(super) fn improve_at(&mut self, at: &mut Iterate<'_>, way: f32) -> Result<bool> {
         let input = self.input;
         let (local, mut step, problem) = self.local_solver()?;
-        let over = |problem: &mut ContactProblem, u: &[f32]| over_kept(input, problem, u, way);
+        let over =
+            |problem: &mut ContactProblem, u: &[f32], t| over_kept(input, problem, u, (way, t));
         let is_better = local.improve(&mut step, problem, at.u, way, over)?;
         problem
             .work
@@ -222,5 +229,25 @@ impl ToolStep<'_> {
             drift: &solver.balance.drift,
         };
         Ok((local, step, self.problem))
+    }
+}
+
+/// How deep tissue `u` and the tools lie in each other, at part `way` of their way, over what part `t` of an iteration's direction may leave; without bounds
+/// where forces are no contact.
+fn over_kept(
+    input: &Input<'_>,
+    problem: &mut ContactProblem,
+    u: &[f32],
+    (way, t): (f32, f32),
+) -> f32 {
+    let thin = if t < SHORT {
+        KEPT_THIN_SHORT_MM
+    } else {
+        KEPT_THIN_MM
+    };
+    let kept = [KEPT_MM, thin];
+    match problem.next.is_wedged(&problem.past) {
+        true => f32::MAX,
+        false => problem.depths().over(state(input, u), way, kept),
     }
 }
