@@ -22,6 +22,7 @@ impl StepMaker {
         start: Instant,
         stats: &mut SceneStats,
     ) -> Result<()> {
+        // Without a learned part the step is the modes' own motion, and corrections make all of it.
         let learns = self.learns();
         let Some(corrected) = &mut self.corrected else {
             return Ok(());
@@ -41,6 +42,8 @@ impl StepMaker {
         let mut watch = Stopwatch::start();
         let _span = tracing::trace_span!("corrections").entered();
         let states = &mut self.states;
+        // Here contact is that of nodes that the host prescribes; what tools touch is made by
+        // `drive`.
         let touched = !states.incoming.is_empty();
         // The learned part takes over some steps after a release; with a length of step of the scene's own it never does.
         states.next_corrected = touched || (!learns && !alone) || self.loads.loaded;
@@ -72,6 +75,8 @@ impl StepMaker {
         let report = if touched {
             Some(solver.correct(context, &input, next)?)
         } else if learns {
+            // The learned part has made the field: velocities and inertia are all that is left to
+            // do.
             solver.follow(context, &input, next)?;
             None
         } else {
@@ -100,6 +105,7 @@ impl StepMaker {
         let Some(corrected) = &self.corrected else {
             return false;
         };
+        // Under tools the forces are known from the contact itself.
         if self.tools.pushes() {
             self.tools.loads_at_contacts(&self.states, out);
             return true;
@@ -116,6 +122,7 @@ impl StepMaker {
     }
 
     /// Before a step that the learned part makes: its records become those of the corrected states, which it did not predict.
+    /// `was_corrected` is of the last state and of the one before it.
     pub(super) fn start_from_corrected(&mut self, shared: &Published) -> Result<()> {
         let Some(corrected) = &self.corrected else {
             return Ok(());

@@ -13,6 +13,7 @@ const WHAT: &str = "the motion of a cut body";
 
 impl Corrector {
     /// Takes velocities, inertia and stresses from before the body was cut; `source` is the node there of each node.
+    /// Called on the corrections of the new body while those of the old one are still whole.
     pub(super) fn follow(
         &mut self,
         context: SolverContext<'_>,
@@ -32,6 +33,7 @@ impl Corrector {
             extent: was.extent,
             truncated_mm: was.truncated_mm,
             error_mm: was.error_mm,
+            // It is of the old nodes, and the next step makes its own.
             reaction: Vec::new(),
         };
         spread(&was.velocity, &mut motion.velocity, source);
@@ -69,6 +71,8 @@ impl Corrector {
 
 /// The number, in the body before, of what each element stems from, by its own number. Cells of one mesh element that an earlier cut has parted have been
 /// strained on their own since.
+/// By element of the body as it is now, first those of the intact mesh in their order, then the
+/// cells of the cut ones.
 fn element_sources(
     body: &SceneBody,
     before: &SceneBody,

@@ -45,6 +45,7 @@ impl StepMaker {
             return Ok(true);
         }
         if near && (problem.past.has_forces() || problem.next.has_grasp()) {
+            // What a step reports must be of the state that it publishes.
             let before = *stats;
             self.load(published, start, stats)?;
             let tools = &self.tools.problem;
@@ -103,6 +104,8 @@ impl StepMaker {
         };
         let mut watch = Stopwatch::start();
         let span = tracing::trace_span!("corrections").entered();
+        // Room for shorter steps is asked for before the step, so that one that needs them cannot
+        // fail half way for want of it.
         parts.be_ready(context, &self.body.model)?;
         let shared = lock_read(published);
         let states = &mut self.states;

@@ -40,6 +40,8 @@ impl Pressed {
         };
         let rows = numbered().map(|(row, face)| (sorted(face), row as u32));
         let mut rows = memory::collected(faces.len(), rows, WHAT)?;
+        // Looked up by corners, since the skin names faces by element and the mesh's boundary by
+        // nodes.
         rows.sort_unstable();
         let row_of = |(element, face): (u32, u8)| {
             let tet = body.mesh().tet(element);
@@ -47,6 +49,8 @@ impl Pressed {
             let at = rows.binary_search_by_key(&corners, |own| own.0).ok()?;
             Some(rows[at].1)
         };
+        // A boundary triangle of a touched element is left out as a whole; the skin has what is
+        // left of it, in parts.
         let mut is_whole = memory::filled(faces.len(), true, WHAT)?;
         for element in body.changed_elements().filter(|own| body.is_touched(*own)) {
             for row in (0..4).filter_map(|face| row_of((element, face))) {
@@ -60,6 +64,7 @@ impl Pressed {
                 .filter(|(row, _)| is_whole[*row])
                 .map(|(row, face)| (row as u32, face)),
         );
+        // Corners from `K` on are points of the skin, each on up to four nodes.
         let first = mesh.node_count() as u32;
         for triangle in &skin.triangles {
             let row = match triangle.border {
@@ -70,6 +75,7 @@ impl Pressed {
         }
         let points = skin.vertices.iter().map(|vertex| LoadPoint {
             nodes: vertex.nodes.map(|node| match node {
+                // Any node will do, because its weight is 0.
                 topology::surface::NONE => 0,
                 node => node,
             }),

@@ -109,6 +109,8 @@ fn deepest_by_walls(
 }
 
 /// The way out of a point through the nearest triangle that has it behind itself; none where another triangle is clearly nearer.
+/// It looks at all faces of the domain, so it is for bodies with walls alone; without walls
+/// `deepest` finds the nearest node in lanes first.
 fn behind(point: Vector, samples: &Samples, state: State<'_>) -> Option<Buried> {
     let (mut nearest, mut best) = (f32::MAX, None);
     let mut length = f32::MAX;
@@ -119,6 +121,8 @@ fn behind(point: Vector, samples: &Samples, state: State<'_>) -> Option<Buried> 
         let [u, v, w] = weights;
         let away = a * u + b * v + c * w - point;
         let square = away.length_squared();
+        // `nearest` is of all faces and `length` of those that have the point behind them: the two
+        // differ where a face in front of the point is nearer.
         nearest = nearest.min(square);
         if square < length && away.dot((b - a).cross(c - a)) > 0.0 {
             (length, best) = (square, Some((face, weights, away)));
@@ -138,6 +142,7 @@ fn through(
     out: Vector,
     (samples, face, weights): (&Samples, usize, [f32; 2]),
 ) -> Option<Buried> {
+    // The lattice has `LATTICE` parts to an edge, and both numbers together stay within the face.
     let [i, j] = weights.map(|weight| (weight * LATTICE as f32).round() as u32);
     Some(Buried {
         out: out.try_normalize()?,
@@ -149,6 +154,7 @@ fn through(
 
 /// Where a tool's probes are, each once: those of a ball are all its middle.
 fn probes(body: &Body, pose: &Pose) -> impl Iterator<Item = Vector> {
+    // Equal probes follow each other, so the last one is enough to compare with.
     let mut last = None;
     let is_new = move |probe: &Vector| last.replace(*probe) != Some(*probe);
     let new = body.probes().filter(is_new);
@@ -182,6 +188,8 @@ fn deepest(
         let squares = nearest.squares.iter().zip(nearest.places).take(count);
         for (at, (&square, place)) in squares.enumerate() {
             let depth = deepest.map_or(least, |buried| buried.depth);
+            // No way out is longer than the distance to the nearest node, so this probe cannot be
+            // deeper than the deepest so far.
             if square.sqrt() <= depth {
                 continue;
             }
@@ -259,6 +267,7 @@ fn below(
 }
 
 /// Whether a point of a face lies on an edge that no other face has, or at a corner of one.
+/// An edge inside of the surface has two faces, one at its rim has one.
 fn is_on_rim(samples: &Samples, face: usize, weights: [f32; 3]) -> bool {
     let corners = samples.corners(face);
     let is_at = |corner: u32| (corners.iter().zip(weights)).any(|(c, w)| *c == corner && w > 0.0);

@@ -13,6 +13,8 @@ use crate::kernels::respond::columns_f32;
 use crate::memory::{self, HeldBytes};
 
 /// The modes at the samples of the last call, and rows that were made since it.
+/// A frame asks for few rows out of many samples, again and again with other times: hence rows on
+/// demand, and a matrix that is never whole.
 #[derive(Debug, Default, HeldBytes)]
 pub struct InertialCompliance {
     /// By mode, `[m,3n]`.
@@ -59,6 +61,7 @@ impl InertialCompliance {
             ..compliance
         };
         let (fixed, is_new) = delassus.fixed(alone, all, rows)?;
+        // Only other samples need their modes read anew; another time changes `lost` alone.
         if is_new || self.modes.len() != lost.len() * order {
             self.read(compliance, all, rows)?;
         }
@@ -84,6 +87,8 @@ impl InertialCompliance {
         memory::fit(&mut self.rows, order * order, WHAT)?;
         memory::fit(&mut self.all, count, WHAT)?;
         memory::fit(&mut self.modes, count * order, WHAT)?;
+        // It never shrinks: rows that have not been made for this time are not read, so what they
+        // hold does not matter.
         let most = self.rows.len().max(order * order);
         self.rows.resize(most, 0.0);
         self.modes.resize(count * order, 0.0);
@@ -120,6 +125,7 @@ impl Rows for At<'_> {
                 let modes = own.modes.chunks_exact(order).zip(self.lost);
                 own.factors.clear();
                 own.factors
+                    // `-G diag(lost) G^T`, one row of it.
                     .extend(modes.map(|(mode, lost)| -lost * mode[at]));
                 let row = &mut own.rows[at * order..(at + 1) * order];
                 columns_f32(

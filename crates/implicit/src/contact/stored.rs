@@ -1,6 +1,7 @@
 //! Vectors, poses, grasps and ties in a snapshot.
 
 /// Three numbers.
+// Types of `crates/contact` are written as plain numbers, in the order that snapshots have had.
 pub mod vector {
     use ::contact::Vector;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -59,6 +60,7 @@ pub mod tie {
 
     type Point = ([u32; 3], [f32; 3]);
 
+    // A variant is written by its place in this list: new ones go to the end.
     #[derive(Serialize, Deserialize)]
     enum Far {
         World([f32; 3]),

@@ -10,6 +10,9 @@ use crate::memory;
 
 impl Balance {
     /// Takes the loads of the step: those at its end off the drift.
+    /// Loads are in µN here, as the residual is. `F(u) = f_int(u) + M (a + alpha v) - p` has them
+    /// on the side of the drift, so nothing else in an iteration knows of them
+    /// (`docs/decisions/028-loads.md`).
     pub(super) fn take_load(
         &mut self,
         input: &Input<'_>,
@@ -18,6 +21,7 @@ impl Balance {
         relaxing: Option<&Relaxing>,
     ) -> Result<()> {
         if input.load.is_none() && relaxing.is_none() {
+            // Empty says that there is none: no pass over the nodes for zeros.
             self.load.clear();
             return Ok(());
         }

@@ -50,6 +50,7 @@ impl<'a> Gauge<'a> {
             sample,
             force,
             far: false,
+            // `Moving::contact` measures it, with the part of the way that is asked for.
             gap: 0.0,
             point: nodes.gather(|node| state.position(node)),
             outward: (self.samples).outward(sample, |node| state.position(node)),
@@ -67,6 +68,7 @@ impl<'a> Gauge<'a> {
             let contact = moving.contact(&row, part);
             contact.gap < OPEN_MM && contact.normal.dot(row.outward) <= LEAN
         };
+        // A tool without forces pushes from nowhere.
         forces.peek().is_some() && forces.all(is_outside)
     }
 }

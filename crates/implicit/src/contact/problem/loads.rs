@@ -28,6 +28,8 @@ impl ContactProblem {
     }
 
     /// Nodes of the samples that push, without held ones, in no order and perhaps twice.
+    /// Ties are left out: `touched` is what a host is shown as contact, and `reached` adds them for
+    /// the solver.
     fn gather_touched(&mut self, held: &[bool]) {
         let nodes = &mut self.prescribed.nodes;
         nodes.clear();
@@ -35,6 +37,7 @@ impl ContactProblem {
         for force in forces.filter(|force| force.tool != NO_TOOL) {
             let sample = self.surface.samples.at(force.sample);
             let own = sample.entries().map(|entry| entry.0);
+            // A force on a held node is borne by the bone or the table and moves nothing.
             nodes.extend(own.filter(|node| !held[*node as usize]));
         }
     }
@@ -77,6 +80,7 @@ impl ContactProblem {
                     .gather(|n| state.position(n));
                 // `row.force` is on the tissue, and the tool feels the opposite.
                 force -= row.force;
+                // About the origin of the tool's pose, mN mm.
                 torque -= (point - tool.pose.translation).cross(row.force);
                 contacts += 1;
                 if held.grasp.place(row.sample).is_some() {
@@ -93,6 +97,7 @@ impl ContactProblem {
                 true => tool.tear_off_mn,
                 false => STRONGEST_GRASP_MN,
             };
+            // Torn stays torn, though the step may be made again with less pull.
             let torn = held.reading.torn || held.grasp.tear(pull, tear_off);
             held.reading = ToolReading {
                 force: force.to_array(),

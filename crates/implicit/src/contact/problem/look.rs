@@ -29,6 +29,7 @@ pub struct Look {
 }
 
 /// The rows of a problem.
+/// Made with room for the rows of two solves when the problem is, and filled anew by each look.
 #[derive(HeldBytes)]
 pub struct NearRows {
     /// What the last look found, ascending by tool and sample, then the ties.
@@ -93,6 +94,8 @@ impl NearRows {
                 false => 0.0,
             };
             let depth = ways.buried[index].map_or(0.0, |buried| buried.depth);
+            // The skin is widened by how far the tool has come, or lies in the tissue: samples that
+            // it has passed are that far behind its surface.
             placed[index] = Some(Placed {
                 body: &tool.body,
                 pose: ways.pose(index, part),
@@ -157,6 +160,7 @@ impl NearRows {
             .extend(pushed.map(|force| row(force.tool, force.sample, force.force, false)));
         // Those with a force come first of their equals, and stay; then those that are held.
         self.rows
+            // `dedup_by_key` keeps the first of its equals, so a row keeps the force that it had.
             .sort_unstable_by_key(|row| (row.tool, row.sample, row.force == Vector::ZERO, row.far));
         self.rows.dedup_by_key(|row| (row.tool, row.sample));
         for row in &mut self.rows {
@@ -180,6 +184,8 @@ impl NearRows {
         // One solve costs the square of its rows: a tool as large as the organ leaves what lies less deep to the next solve.
         if self.rows.len() > most {
             memory::fit(&mut self.shed, self.rows.len() - most, WHAT)?;
+            // Forces of rows that are left out are taken off the tissue, not forgotten on it:
+            // `shed` names them.
             self.keep_deepest(gauge, state, part, most);
         }
         tied.add_rows((ways, next), state, &mut self.rows)

@@ -149,6 +149,9 @@ fn add_chunks(far: &FarField, cluster: usize, own: &mut [f32]) {
 }
 
 /// See [`crate::corrections::far`].
+/// A cluster stands for its far elements by their mean deformation gradient alone. Their linear
+/// part is in the modes' Gram matrix already, so only what the law adds to linear elasticity is
+/// computed here (`docs/decisions/023-local-iterations.md`).
 #[derive(HeldBytes)]
 pub(super) struct Clusters {
     /// `sum v grad Phi` over the far elements of each cluster `[C,9,r]`, mm³ a mode's mm.
@@ -156,7 +159,10 @@ pub(super) struct Clusters {
     /// `0..9 C`.
     rows: Vec<u32>,
     /// Volume of the far elements, mm³; whether some of a cluster's elements are near.
+    /// In f64: near parts are subtracted from them, and a difference of large sums would lose a
+    /// small rest.
     volumes: Vec<f64>,
+    /// All are taken as cut at first, so that the first `take` fills every table.
     is_cut: Vec<bool>,
     /// `V H` at the base, mm³, and there what the law adds to the stress, Pa.
     base: Vec<f64>,
@@ -188,6 +194,7 @@ impl Clusters {
         for cluster in 0..self.volumes.len() {
             let own = &mut self.on_modes[cluster * size..][..size];
             let left = cut.next_if(|left| left.cluster as usize == cluster);
+            // Whole before and whole now: its table stands.
             if left.is_none() && !self.is_cut[cluster] {
                 continue;
             }
@@ -207,6 +214,8 @@ impl Clusters {
     }
 
     /// Takes the field `[K,3]` as the base.
+    /// `V H` of the far elements: that of whole chunks over their borders, less what the near
+    /// elements have of it.
     pub fn begin(&mut self, far: &FarField, near: &NearSet, u: &[f32]) {
         for (cluster, base) in self.base.chunks_exact_mut(NINE).enumerate() {
             base.fill(0.0);
@@ -237,6 +246,7 @@ impl Clusters {
     fn added(&self, far: &FarField, cluster: usize) -> ([f64; NINE], f64) {
         let volume = self.volumes[cluster];
         if volume <= 0.0 {
+            // Nothing far is left of it: no stress, and nothing that could be inverted.
             return ([0.0; NINE], 1.0);
         }
         let range = cluster * NINE..(cluster + 1) * NINE;
@@ -264,6 +274,8 @@ impl Clusters {
             let range = cluster * NINE..(cluster + 1) * NINE;
             let base = &self.base_stress[range.clone()];
             for ((to, stress), base) in self.stress[range].iter_mut().zip(stress).zip(base) {
+                // The base's own stress is in the base's residual, which was evaluated by all
+                // elements.
                 *to = (stress - base) as f32;
             }
         }

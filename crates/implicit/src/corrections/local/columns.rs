@@ -16,9 +16,13 @@ use crate::memory::{self, HeldBytes};
 const SYMMETRIC: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
 /// What is known of columns, with the factor that it was made by.
+/// A column is the answer to a unit force at one touched node, for the three axes. Contact asks for
+/// the same ones in iteration after iteration, so each is made once a factor.
 #[derive(Default, HeldBytes)]
 pub(super) struct NearColumns {
     /// Number of the factor: another one makes all columns anew.
+    /// It is compared with the factor's on every look, so no caller has to say that the factor is a
+    /// new one.
     generation: u64,
     /// Columns of the prior that are known, in the order of the lists that follow.
     columns: Vec<u32>,
@@ -46,6 +50,7 @@ impl Tangent for Response<'_> {
     fn gather(&self, columns: &[u32], upper: &mut [f64]) -> Result<()> {
         let mut own = self.own.borrow_mut();
         let (factor, known, room) = &mut *own;
+        // Columns of a factor that is gone would make the contact's matrix unsymmetric.
         if known.generation != factor.generation {
             known.clear();
             known.generation = factor.generation;
@@ -54,6 +59,7 @@ impl Tangent for Response<'_> {
         // Entry (i, j) is `e_i . P e_j` by the two levels of the preconditioner: the factor's move in the core, and the work of the force on the modes times their answer.
         let (size, modes) = (3 * self.near.places.core, self.env.space.count());
         let order = 3 * columns.len();
+        // All columns are known after `make`: the 0 is never taken.
         let at = |column: u32| known.columns.iter().position(|c| *c == column).unwrap_or(0);
         for (j, &column) in columns.iter().enumerate() {
             let column = at(column);
@@ -69,6 +75,7 @@ impl Tangent for Response<'_> {
                     let row = at(row);
                     for a in 0..3 {
                         let work = &known.on_modes[(3 * row + a) * modes..][..modes];
+                        // `work` is in µN, and a compliance is mm for each mN.
                         let mut sum = 1e-3 * dot(work, response);
                         match place {
                             Some(place) if place < self.near.places.core => {
@@ -138,6 +145,7 @@ impl NearColumns {
         for (at, &column) in self.made[..in_core].iter().enumerate() {
             let place = core(column).unwrap_or(0);
             for axis in 0..3 {
+                // 1 mN in the µN of the residual.
                 moved[(3 * at + axis) * size + 3 * place + axis] = 1e3;
             }
         }

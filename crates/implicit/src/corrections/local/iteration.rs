@@ -16,6 +16,9 @@ use crate::memory;
 impl LocalSolver {
     /// One iteration with the tools at part `way` of their way; tells whether it led to another state. `over` says how deep tissue and tools lie in each other there, over what a
     /// part of the direction may leave.
+    ///
+    /// `base` is the field `[K,3]` that the round began with, mm. `over` gets the problem, the trial
+    /// field and the part of the direction; at most 1 means that the contact is not lost.
     pub(in crate::corrections) fn improve(
         &mut self,
         step: &mut StepContext<'_>,
@@ -33,11 +36,14 @@ impl LocalSolver {
         self.solve_contact(step, problem, base, way)?;
         self.decode_direction(step)?;
         // What of the change along the direction is linear is computed once here; each part `t` of it then costs the near elements alone.
+        // `G c` of the direction: what `K + kappa M` makes of its modes, on the modes.
         let stiff = &mut self.d.stiff;
         step.preconditioner.stiffen(env, &self.d.step.c, stiff)?;
         (self.set.near).linear(env, &self.d.modes, None, &mut self.d.linear);
         self.measure_direction(env);
         // Along a line the loads do not change, so their work is a constant of the slopes.
+        // The slope of the energy along the line is `F(u) . d - f . d`: the second part stays as
+        // the tools' loads do.
         let work = self.work(problem);
         let slope = self.residuals.residual.over(&self.d.step) - work;
         let most = match self.is_dear(problem) {
@@ -61,6 +67,8 @@ impl LocalSolver {
                 self.place_at(base, 0.0);
                 left <= over(problem, &self.residuals.trial, t)
             };
+            // A part stands where the mean of the slopes at its ends says that the energy falls,
+            // elements are sound and the contact is kept; else a shorter one is tried, a few times.
             match search.judge(is_kept, slope_new) {
                 Tried::Accepted => {
                     self.accept(step, t)?;
@@ -95,6 +103,8 @@ impl LocalSolver {
         self.take_loads_off(step, problem)?;
         // The two halves of L-BFGS, with the preconditioner where an initial matrix would stand.
         // Both halves change `reduced` and `d` in place: the first takes off it what the pairs know, the second adds that to the direction.
+        // `recursion` holds the coefficients that the second half needs (Nocedal and Wright,
+        // algorithm 7.4).
         let recursion = self.pairs.descend(env.isa, &mut self.residuals.reduced);
         self.d.step.clear(&self.set.near)?;
         self.precondition(step)?;
@@ -103,6 +113,8 @@ impl LocalSolver {
     }
 
     /// Takes the work of the modes on the tools' loads off the reduced residual.
+    /// `Phi^T f` needs no field where the forces lie on nodes with columns: their rows of the modes
+    /// are stored.
     fn take_loads_off(&mut self, step: &StepContext<'_>, problem: &ContactProblem) -> Result<()> {
         let env = step.context.env();
         let (p, mut is_known) = (&mut self.residuals.reduced.p, true);
@@ -156,6 +168,8 @@ impl LocalSolver {
     }
 
     /// `P` of the reduced residual, added to the direction ([`super::factor`]); outside of the core `w D^-1`.
+    /// The two halves in the core before and after the modes make the whole symmetric, as L-BFGS
+    /// needs.
     fn precondition(&mut self, step: &mut StepContext<'_>) -> Result<()> {
         let env = step.context.env();
         let preconditioner = &*step.preconditioner;

@@ -10,9 +10,12 @@ use crate::memory::{self, HeldBytes};
 use crate::stored;
 
 /// What is kept of a pair.
+/// By node and mode and not by place, so that a pair outlives the near set that it was made with
+/// (`docs/decisions/023-local-iterations.md`).
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, HeldBytes)]
 pub struct Record {
     /// Nodes that the tools touched when it was made, thinned out, and the centres of what was near.
+    /// The near set that is made next is made about these, too.
     #[serde(with = "stored")]
     pub about: Vec<u32>,
     #[serde(with = "stored")]

@@ -18,6 +18,7 @@ impl LocalSolver {
         let env = step.context.env();
         let preconditioner = &mut *step.preconditioner;
         // `Phi c` at all nodes, once a round, and what the whole modes have been asked for with it.
+        // A copy: `join` adds what is no part of the iterations' own amplitudes.
         let c = &mut self.spare.more_on_modes;
         c.copy_from_slice(&self.now.step.c);
         if with_whole {
@@ -30,6 +31,7 @@ impl LocalSolver {
         }
         for (place, t) in self.now.step.t.as_chunks::<3>().0.iter().enumerate() {
             let node = self.set.near.places.nodes[place] as usize;
+            // The inside nodes, which alone have a `t`, come first among the places.
             add(1.0, t, &mut scratch[3 * node..][..3]);
         }
         let (near, count) = (&self.set.near, u.len() / 3);

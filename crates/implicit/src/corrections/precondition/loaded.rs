@@ -30,7 +30,11 @@ impl Preconditioner {
         env: Env<'_>,
         has_load: bool,
     ) -> Result<()> {
+        // A step without a load that acts everywhere leaves the whole modes alone: they cost a pass
+        // over all nodes.
         self.whole.has_load = has_load;
+        // Another set of groups that are let go is another boundary, for which the solve is made
+        // anew.
         if self.whole.let_go != env.held.let_go {
             self.whole.let_go = env.held.let_go;
             self.whole.solve = None;
@@ -98,8 +102,10 @@ impl WholeLevel {
             *own.sampled() = sampled(env, modes, own, room)?;
         }
         own.project(env.compute(), modes, r)?;
+        // Forces of the contact are in mN, residuals in µN.
         each_load(&mut |node, force| own.take_force(modes, node, force.map(|f| 1e3 * f)));
         own.finish(env.compute(), on_modes);
+        // The residual points uphill, and what is asked for is the move down: hence the sign.
         own.turn();
         Ok(Some(own.most_mm()))
     }
@@ -121,6 +127,8 @@ impl WholeLevel {
 }
 
 /// What each whole mode does at some nodes: fields as smooth as these go hardly farther between them.
+/// Made once for each solve of the whole modes and then read by every step, `[3 n, m]` with one of
+/// 16 nodes and `m` whole modes.
 fn sampled(
     env: Env<'_>,
     modes: &WholeModes,

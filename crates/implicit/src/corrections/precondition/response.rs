@@ -10,6 +10,7 @@ use crate::kernels::rows::decode_rows;
 impl Preconditioner {
     /// `L_C^T r` at the prescribed nodes with columns, from `r [K,3]` that is zero there: what the free nodes' residual adds to the contact
     /// forces, µN.
+    /// It writes over `coordinates`: whoever needs the field of those from before has decoded it.
     pub fn reaction(
         &mut self,
         env: Env<'_>,
@@ -41,6 +42,8 @@ impl Preconditioner {
     }
 
     /// `coordinates` of `Phi solved + W forces`.
+    /// The columns `W` are those of the static response. What inertia takes off the natural modes'
+    /// part of it is taken off in their amplitudes.
     pub(super) fn spread(&mut self, env: Env<'_>) -> Result<()> {
         for (&dof, force) in self.contact.dofs.iter().zip(&self.contact.forces) {
             let own = env.space.at_contact(dof as usize);
@@ -76,6 +79,7 @@ impl Preconditioner {
         let isa = env.isa;
         let mut slot = 0;
         for (index, &node) in self.nodes.iter().enumerate() {
+            // Only nodes with a column of the prior can be moved by a response.
             if !matches!(env.prior.column_for(&env.held.is, node), Some((_, true))) {
                 continue;
             }
@@ -101,6 +105,8 @@ impl Preconditioner {
     }
 
     /// `coordinates += A_k f` of forces `f` (mN) on degrees of freedom with columns.
+    /// `A_k = W - N diag(lost) N^T`: the static columns, less what inertia holds back in a step of
+    /// this length.
     pub fn add_load(&mut self, env: Env<'_>, dofs: &[u32], forces: &[f32]) -> Result<()> {
         let count = self.modal.inertial_compliance.len();
         self.solved.fill(0.0);
@@ -117,6 +123,7 @@ impl Preconditioner {
         }
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
         let rows = &env.space.rows()[..count];
+        // The natural modes come first among the modes, and they alone have an inertial part.
         let natural = &self.solved[..count];
         let modes = env.space.modes();
         accumulate_rows(isa, pool, modes, rows, natural, true, q)?;
@@ -125,6 +132,8 @@ impl Preconditioner {
     }
 
     /// `coordinates = -N diag(1 / (m (w² + kappa))) N^T r` of a residual `[K,3]`, µN, that is zero at held nodes.
+    /// `kappa` stands for the inertia of BDF2: `w² + kappa` is what a natural mode has of `K +
+    /// kappa M` over its mass.
     pub fn move_natural(&mut self, env: Env<'_>, r: &[f32]) -> Result<()> {
         let (isa, pool) = (env.isa, env.pool);
         let count = self.modal.inertial_compliance.len();
@@ -193,11 +202,13 @@ impl Preconditioner {
         accumulate_rows(isa, pool, modes, rows, y, false, q)?;
         let basis = env.prior.basis();
         decode_rows(isa, pool, &basis, &self.basis.plan, q, out)?;
+        // A field of the body is zero at held nodes, whatever the basis has there.
         mask_held(&env.held.is, out);
         Ok(())
     }
 
     /// Adds the field of `coordinates`.
+    /// `scratch` has the change alone afterwards.
     fn add_decoded(&mut self, env: Env<'_>, scratch: &mut [f32], u: &mut [f32]) -> Result<()> {
         let basis = env.prior.basis();
         decode_rows(

@@ -13,6 +13,7 @@ impl ToolStep<'_> {
         let (solver, env) = (&mut *self.solver, self.context.env());
         let problem = &*self.problem;
         let Some(local) = &mut solver.local else {
+            // Not known: the caller then measures the move before it lets it stand.
             return Ok(f32::INFINITY);
         };
         let Some(on_modes) = local.base_on_modes(env, problem) else {
@@ -21,6 +22,8 @@ impl ToolStep<'_> {
         let each_load = |take: &mut dyn FnMut(u32, [f32; 3])| {
             problem.each_load(|node, force| take(node, force.to_array()));
         };
+        // The residual is that of the base, since only it is known at all nodes until the round
+        // ends.
         let base = (at.g.as_slice(), on_modes);
         let own = &mut solver.preconditioner;
         let room = (
