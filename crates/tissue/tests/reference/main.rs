@@ -10,6 +10,7 @@ mod dataset;
 mod determinism;
 mod dynamics;
 mod failures;
+#[cfg(feature = "linear")]
 mod fibres;
 mod groups;
 #[cfg(feature = "linear")]
