@@ -74,7 +74,7 @@ pub(crate) fn add_tangent(
     }
 }
 
-/// Adds the same of an element between its corners, times `weight`, µN/mm.
+/// Adds the stiffness that fibres give an element between its corners, times `weight`, µN/mm.
 pub(crate) fn add_stiffness(
     fibres: &Fibred,
     own: Option<Stretched>,

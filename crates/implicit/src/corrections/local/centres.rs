@@ -42,7 +42,7 @@ pub(super) enum Reached {
 
 /// What of a box, `[low, high]` of nodes at rest, lies within a distance of one of some nodes; where it is a part, `close` has the nodes that reach into it.
 ///
-/// Sums and their order are those of [`is_by`], and rounding keeps what is farther from being nearer: both say the same of each node in the box.
+/// Sums and their order are those of [`is_by`], and rounding keeps what is farther from being nearer: for each node in the box both give one answer.
 pub(super) fn reach_of(
     (rest, nodes): (&[f32], &[u32]),
     distance: f32,

@@ -28,7 +28,7 @@ struct Left {
     /// Volume of the far elements, mm³; zero where all are near.
     volume: f64,
     /// `sum v grad Phi` over the *near* elements, `[9,r]`, and the weights at mesh nodes that it was made of: it follows from them alone, so where a
-    /// set that grows with a cut, or moves on with a tool, has the same of a cluster, it stands.
+    /// set that grows with a cut, or moves on with a tool, has that part of a cluster again, it stands.
     near: Vec<f32>,
     weights: Vec<(u32, [f32; 3])>,
 }

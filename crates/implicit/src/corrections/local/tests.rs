@@ -262,7 +262,7 @@ fn contact_has_the_compliance_of_the_preconditioner() {
     }
 }
 
-/// A box of nodes says the same of each as the nodes do.
+/// What is said of a box holds for each of its nodes.
 #[test]
 fn what_is_reached_of_a_box_is_what_is_reached_of_its_nodes() {
     let mut random = Random::new(3);
