@@ -67,6 +67,18 @@ fn manifest_errors_name_the_field() {
         (
             "tiny-upt",
             "/material/law",
+            serde_json::json!({"name": "fibres", "k1_over_mu": -5, "k2": 2, "matrix": {"name": "neo-hookean"}}),
+            "material.law.k1_over_mu",
+        ),
+        (
+            "tiny-upt",
+            "/material/law",
+            serde_json::json!({"name": "fibres", "k1_over_mu": 5, "k2": 2, "matrix": {"name": "neo-hookean"}}),
+            "number of directions in `fibre`",
+        ),
+        (
+            "tiny-upt",
+            "/material/law",
             serde_json::json!({"name": "ogden", "terms": [{"mu_pa": 157, "alpha": -18.7}]}),
             "material.law.terms[0].mu_pa",
         ),

@@ -5,13 +5,14 @@
     reason = "components of tensors read best by index"
 )]
 
+mod differences;
+
+use differences::{Matrix, largest, slope};
 use elements::vector::dot;
 use elements::{
     Deformation, Fibred, Law, Laws, Material, Moduli, Region, Tetrahedron, add_mean_stress,
     energy_density, stiffest_pull, stress, tangent,
 };
-
-type Matrix = [[f64; 3]; 3];
 
 const ALONG: [f64; 3] = [0.6, 0.0, 0.8];
 
@@ -47,20 +48,6 @@ fn stretched(along: f64, across: f64) -> Matrix {
 /// Below the cap, beyond it for the stiffer ones, and slack.
 fn shapes() -> [Matrix; 4] {
     [(0.1, -0.04), (0.45, -0.15), (-0.12, 0.05), (0.02, 0.1)].map(|(a, b)| stretched(a, b))
-}
-
-fn slope(f: Matrix, [i, j]: [usize; 2], of: impl Fn(Matrix) -> f64) -> f64 {
-    let step = 1e-4;
-    let at = |k: f64| {
-        let mut f = f;
-        f[i][j] += k * step;
-        of(f)
-    };
-    (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step)
-}
-
-fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
-    values.into_iter().fold(0.0, |a: f64, b| a.max(b.abs()))
 }
 
 /// Verifies REQ-081.

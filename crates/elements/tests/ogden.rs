@@ -5,13 +5,14 @@
     reason = "components of tensors read best by index"
 )]
 
+mod differences;
+
+use differences::{Matrix, largest, slope};
 use elements::vector::dot;
 use elements::{
     Deformation, Law, Material, Moduli, MooneyRivlin, Ogden, Tetrahedron, energy_density, stress,
     tangent,
 };
-
-type Matrix = [[f64; 3]; 3];
 
 /// Laws of brain, of rubber, with terms of opposite exponents and of whole and broken ones.
 const LAWS: [&[[f64; 2]]; 6] = [
@@ -73,21 +74,6 @@ fn cauchy(f: Matrix, moduli: Moduli) -> Matrix {
     let state = Deformation::of(f);
     let p = stress(&state, moduli);
     [0, 1, 2].map(|i| [0, 1, 2].map(|j| dot(p[i], f[j]) / state.det))
-}
-
-fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
-    values.into_iter().fold(0.0, |a: f64, b| a.max(b.abs()))
-}
-
-/// Fourth-order difference of `of` over one entry of `F`.
-fn slope(f: Matrix, [i, j]: [usize; 2], of: impl Fn(Matrix) -> f64) -> f64 {
-    let step = 1e-4;
-    let at = |k: f64| {
-        let mut f = f;
-        f[i][j] += k * step;
-        of(f)
-    };
-    (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * step)
 }
 
 #[test]

@@ -3,7 +3,7 @@
 //! `w = H a` is a sum over the corners of displacement times slope along the fibres; from positions the same sum is `F a`, less `a`. So `x = 2 a.w + w.w`, and the force
 //! on corner `k` is `-V 2 psi'(x) (a + w) (g_k . a)`.
 
-use super::shape::{dot, edges, load};
+use super::shape::{add_balanced, dot, edges, load};
 use crate::cluster::{Cluster, corners};
 use crate::directions::Directions;
 use crate::laws::Fibred;
@@ -111,15 +111,7 @@ pub unsafe fn add_forces_of_fibres<L: NodeLanes, const NODES: usize, const TETS:
                         }
                     }
                 }
-                for node in 1..NODES {
-                    for i in 0..3 {
-                        force[0][i] = force[0][i].sub(force[node][i]);
-                    }
-                }
-                for node in 0..NODES {
-                    let slots = cluster.slots[node].as_ptr().add(first);
-                    L::scatter_add(forces, slots, force[node]);
-                }
+                add_balanced(cluster, first, force, forces);
             }
         }
     }

@@ -4,7 +4,7 @@
 //! strain ([`crate::principal`] has the equations), so f32 loses no digits at small ones: `P = cof F (T / J + kappa (J - 1))`, and the force on
 //! corner `k` is `-V P g_k`.
 
-use super::shape::{dot, edges, load};
+use super::shape::{add_balanced, dot, edges, load};
 use super::stretches::{Eigenvalues, LaneTerms, Strain, deviator};
 use crate::cluster::{Cluster, corners};
 use crate::gradients::Gradients;
@@ -139,15 +139,7 @@ pub unsafe fn add_forces_of_stretches<L: Eigenvalues, const NODES: usize, const 
                         }
                     }
                 }
-                for node in 1..NODES {
-                    for i in 0..3 {
-                        force[0][i] = force[0][i].sub(force[node][i]);
-                    }
-                }
-                for node in 0..NODES {
-                    let slots = cluster.slots[node].as_ptr().add(first);
-                    L::scatter_add(forces, slots, force[node]);
-                }
+                add_balanced(cluster, first, force, forces);
             }
         }
         let mut lanes = [f32::MAX; WIDTH];

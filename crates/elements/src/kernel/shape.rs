@@ -153,3 +153,27 @@ pub(super) unsafe fn shape<
         }
     }
 }
+
+/// Adds forces on the corners of lanes from `first` on, µN, those of node 0 being what balances the others.
+///
+/// # Safety
+/// The instruction set of `L` is there; the slots lie within `forces`.
+#[inline(always)]
+pub(super) unsafe fn add_balanced<L: NodeLanes, const NODES: usize, const TETS: usize>(
+    cluster: &Cluster<NODES, TETS>,
+    first: usize,
+    mut force: [[L; 3]; NODES],
+    forces: *mut [f32; 4],
+) {
+    unsafe {
+        for node in 1..NODES {
+            for i in 0..3 {
+                force[0][i] = force[0][i].sub(force[node][i]);
+            }
+        }
+        for node in 0..NODES {
+            let slots = cluster.slots[node].as_ptr().add(first);
+            L::scatter_add(forces, slots, force[node]);
+        }
+    }
+}

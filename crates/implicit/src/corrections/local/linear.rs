@@ -190,7 +190,7 @@ fn apply<'a>(elements: impl Iterator<Item = &'a Linear>, v: &[f32], out: &mut [f
 pub(super) struct Parts {
     /// By cluster, ascending.
     list: Vec<Part>,
-    /// `sum_e v_e grad N` of their free nodes, by place, mm²; those of a part by the number of the node in the mesh, whatever else is near.
+    /// `sum_e v_e grad N` of their free nodes, a place each, mm²; those of a part in the order of the mesh's nodes, which does not depend on what else is near.
     weights: Vec<(u32, [f32; 3])>,
     sums: Vec<[f32; 3]>,
     /// Places that a sum has been added to, a bit each.
