@@ -106,6 +106,31 @@ fn snapshots_go_across_cuts_and_reset_gives_the_intact_body() {
     assert_eq!(bits(&step(&other, tools)), bits(&step(&fresh, tools)));
 }
 
+/// In a body most of which is far, what a blade has not come to stands from cut to cut: a scene that is restored makes all of it anew, with the same bits.
+#[test]
+fn a_cut_that_grows_steps_as_one_that_is_restored() {
+    let brain = model(fixture::shipped("brain-coarse-reduced"));
+    let scene = Scene::new(brain.clone(), &options()).unwrap();
+    let (at, normal) = site(&scene);
+    let along = normal.any_orthonormal_vector();
+    let point = |a: f32, n: f32| (Vector::from(at) + along * a + normal * n).to_array();
+    let edge = |a: f32| [point(a, 3.0), point(a, -9.0)];
+    let ball = pressing(&scene, 2.0, Vector::ZERO);
+    let tools = std::slice::from_ref(&ball);
+    for piece in 0..6 {
+        let from = 3.0 * piece as f32 - 9.0;
+        let blade = [edge(from), edge(from + 3.0)].concat();
+        scene.cut(1, 2, &blade).unwrap();
+        let parted = scene.save().unwrap();
+        let other = Scene::new(brain.clone(), &options()).unwrap();
+        other.restore(&parted).unwrap();
+        for _ in 0..2 {
+            let (own, restored) = (step(&scene, tools), step(&other, tools));
+            assert_eq!(bits(&own), bits(&restored), "piece {piece}");
+        }
+    }
+}
+
 /// Verifies REQ-060.
 #[test]
 fn what_cannot_be_cut_stays_as_it_is() {
