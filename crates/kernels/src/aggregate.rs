@@ -29,6 +29,7 @@ impl Csr<'_> {
         self.offsets.len().saturating_sub(1)
     }
 
+    /// Senders of supernode `i`, in the order of the list.
     fn row(&self, i: usize) -> &[u32] {
         &self.neighbours[self.offsets[i] as usize..self.offsets[i + 1] as usize]
     }
@@ -129,6 +130,8 @@ pub fn encode_aggregate(
         for i in chunk * ROWS..((chunk + 1) * ROWS).min(rows) {
             // SAFETY: row i belongs to this chunk alone.
             let out = unsafe { parts.part(i * width, width) };
+            // The target table has a row a supernode, the features a row a node: a table of this
+            // one row makes the two indices one.
             let own = LowRank {
                 table: &target.table[i * width..][..width],
                 ..target
@@ -140,6 +143,7 @@ pub fn encode_aggregate(
     })
 }
 
+/// One supernode, in plain Rust: the definition.
 fn row_scalar(neighbours: &[u32], source: &[f32], target: &[f32], out: &mut [f32]) {
     let width = target.len();
     out.fill(0.0);
@@ -172,6 +176,9 @@ unsafe fn row_body<V: DenseLanes>(
     // SAFETY: columns stay below `width`, rows are checked above.
     unsafe {
         let mean = V::splat(1.0 / neighbours.len().max(1) as f32);
+        // Two registers of columns at once: the polynomials of GELU are chains of dependent
+        // multiply-adds, and two chains fill each other's waits. A column adds its neighbours up in
+        // the order of the list in any case.
         while column + 2 * V::COUNT <= width {
             let t = [0, 1].map(|v| V::load(target.as_ptr().add(column + v * V::COUNT)));
             let mut sum = [V::splat(0.0); 2];
@@ -202,6 +209,7 @@ unsafe fn row_body<V: DenseLanes>(
     }
 }
 
+/// One supernode with its senders' rows made on the way, in plain Rust.
 fn fused_row_scalar(
     neighbours: &[u32],
     source: LowRank<'_>,
@@ -249,6 +257,7 @@ unsafe fn fused_row_body<V: DenseLanes>(
             for &j in neighbours {
                 let from = source.table.as_ptr().add(j as usize * width + column);
                 let feature = features.as_ptr().add(j as usize * rank);
+                // The message of one sender is built up in the registers that it is used in.
                 let mut message = [0, 1].map(|v| V::load(from.add(v * V::COUNT)));
                 for k in 0..rank {
                     let f = V::splat(*feature.add(k));

@@ -17,8 +17,11 @@ use gram::whiten_rows;
 use lanes::Isa;
 use upper::{factor_upper, solve_upper};
 
-/// First Tikhonov term, relative to the mean diagonal; ten times more on each further attempt.
+/// First Tikhonov term, relative to the mean diagonal; ten times more on each further attempt. It
+/// is ten times the floor of a pivot (`upper::PIVOT_FLOOR`), so that the first attempt lifts pivots
+/// that are just below it; the last one is 1, the mean diagonal itself.
 const FIRST_TERM: f64 = 1e-5;
+/// One without a term, and six with one.
 const ATTEMPTS: i32 = 7;
 
 /// Why no factor could be made.
@@ -55,6 +58,7 @@ impl FactorReport {
 /// A Cholesky factor of the contact block, kept while the contact nodes stay.
 #[derive(Debug, Default, HeldBytes)]
 pub struct ContactFactor {
+    /// `3 m` of the block taken last, whether or not it has a factor.
     order: usize,
     /// `U [3m,3m]` in the upper triangle, row-major; what is below it is scratch. Its length is what the last block needed.
     upper: Vec<f64>,
@@ -106,6 +110,8 @@ impl ContactFactor {
     ///
     /// # Errors
     /// See [`FactorError`]; there is no factor then ([`ContactFactor::order`] is 0).
+    /// The contact nodes decide the block. While they stay, steps solve with the factor that there
+    /// is, `O(m^2)`; only new nodes cost the `O(m^3)` of this function.
     pub fn factor(
         &mut self,
         isa: Isa,
@@ -123,6 +129,7 @@ impl ContactFactor {
                 term = FIRST_TERM * 10f64.powi(attempt - 1);
             }
             fill(&mut self.upper);
+            // Checked once: what `fill` writes does not change between attempts.
             if attempt == 0 {
                 for (&dof, value) in dofs.iter().zip(self.upper.iter().step_by(order + 1)) {
                     if !(*value > 0.0 && value.is_finite()) {
@@ -173,6 +180,8 @@ impl ContactFactor {
     ///
     /// # Panics
     /// If there is no factor or `z` has another length.
+    /// It is how the elastic coordinates that a contact excludes are taken out of a matrix: `A -=`
+    /// that Gram matrix ([`subtract_gram`]).
     pub fn whiten(&self, isa: Isa, columns: usize, z: &mut [f64]) {
         assert!(self.ready, "no factor: call factor first");
         assert_eq!(z.len(), self.order * columns, "z must be [3m,n]");

@@ -12,9 +12,14 @@ use lanes::{Isa, by_isa};
 /// A table `[n,width]` and its update's weight, transposed: `[rank,width]`.
 #[derive(Debug, Clone, Copy)]
 pub struct LowRank<'a> {
+    /// `[n,width]`, row-major.
     pub(super) table: &'a [f32],
+    /// `[rank,width]`: a feature's weights for all columns lie beside each other, as lanes want
+    /// them.
     pub(super) weight_t: &'a [f32],
+    /// `d`, columns of the table.
     pub(super) width: usize,
+    /// `f`, features of a node.
     pub(super) rank: usize,
 }
 
@@ -97,6 +102,7 @@ pub fn transpose_weight(
     Ok(out)
 }
 
+/// Rows a chunk: enough work to pay for taking it.
 const ROWS: usize = 64;
 
 /// `out_i = table_{rows_i} + W features_{rows_i}`, `out [rows, width]`, in the order of `rows`.

@@ -12,6 +12,8 @@ const BLOCK: usize = 16;
 ///
 /// # Panics
 /// If a node is not below `K`.
+/// Squares are compared, and as bits: one integer maximum a node, and a NaN cannot hide behind a
+/// comparison that is false.
 pub fn largest(isa: Isa, field: &[f32], nodes: &[u32]) -> f32 {
     let mut bits = 0;
     if 3 * nodes.len() == field.len() {

@@ -29,6 +29,7 @@ const ERF_P: [f32; 6] = [
     1.264_651_3e-5,
     4.442_446_3e-8,
 ];
+/// The denominator has no zero on the interval, so one division a lane is safe.
 const ERF_Q: [f32; 6] = [
     1.0,
     2.522_967e-1,
@@ -72,6 +73,8 @@ unsafe fn horner<V: DenseLanes, const M: usize>(coefficients: &[f32; M], x: V) -
 pub(crate) unsafe fn gelu_lanes<V: DenseLanes>(x: V) -> V {
     // SAFETY: the caller's.
     unsafe {
+        // Clamped for the fraction alone: beyond the end `erf` is one, and the factor `x / 2` is
+        // not.
         let end = x.max(V::splat(-ERF_END)).min(V::splat(ERF_END));
         let square = end.mul(end);
         let erf = end.mul(horner(&ERF_P, square)).div(horner(&ERF_Q, square));
@@ -90,6 +93,7 @@ pub(crate) unsafe fn exp2_lanes<V: DenseLanes>(x: V) -> V {
     unsafe {
         let x = x.max(V::splat(-126.0));
         let whole = x.round();
+        // `x = n + f`: the polynomial takes `f`, and `2^n` is written into the exponent, exactly.
         horner(&EXP2, x.sub(whole)).scale_by_power(whole)
     }
 }

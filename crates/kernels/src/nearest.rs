@@ -1,8 +1,12 @@
 //! The nearest of the nodes of a surface to each of a few points.
+//!
+//! All nodes are looked at: a tree over a surface that moves would have to be made anew in every
+//! step, while in one pass [`AT_ONCE`] points share each node that is read.
 
 use lanes::{Isa, by_isa};
 
-/// Points that are looked for at once.
+/// Points that are looked for at once: as many as the widest register has lanes. Places that are
+/// not needed may hold any number, and their results are not read.
 pub const AT_ONCE: usize = 16;
 
 /// Some points by axis, mm.

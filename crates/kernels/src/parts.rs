@@ -1,4 +1,8 @@
 //! One output that the chunks of a job write in disjoint parts.
+//!
+//! Rust lends a slice mutably to one thread only. A job's chunks are closures of one shared borrow,
+//! so the split into parts is promised by the kernel that knows who writes what: a row, a block of
+//! columns, a worker's scratch space. Bounds are checked, disjointness is the promise.
 
 /// A mutable slice that chunks of one job write in disjoint parts.
 pub struct Parts<T> {

@@ -64,6 +64,7 @@ impl From<PoolError> for Error {
 
 /// A small thread pool. Shared by reference; any thread may call [`Pool::run`].
 pub struct Pool {
+    /// What the workers look at; they hold it too, and outlive no pool: [`Drop`] joins them.
     shared: Arc<Shared>,
     /// All threads but the caller's.
     workers: Vec<JoinHandle<()>>,
@@ -261,6 +262,7 @@ impl Drop for Pool {
     }
 }
 
+/// All chunks on this thread, in their order, with the same catch of a panic.
 fn run_alone(chunk_count: usize, task: &Task<'_>) -> Result<(), PoolError> {
     for chunk in 0..chunk_count {
         catch_unwind(AssertUnwindSafe(|| task(chunk, 0))).map_err(|payload| {

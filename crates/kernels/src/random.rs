@@ -4,10 +4,13 @@
 pub struct Random(u64);
 
 impl Random {
+    /// The same numbers for the same seed, on every machine.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
     }
 
+    /// The next 64 bits (Steele, Lea and Flood, Fast splittable pseudorandom number generators,
+    /// OOPSLA 2014).
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut x = self.0;
@@ -27,6 +30,7 @@ impl Random {
     }
 
     /// Normal numbers of a standard deviation.
+    /// By the transform of Box and Muller, of whose two numbers one is used.
     pub fn normal(&mut self, count: usize, deviation: f32) -> Vec<f32> {
         (0..count)
             .map(|_| {

@@ -13,7 +13,8 @@ use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
 use std::ops::Range;
 
-/// Columns a chunk.
+/// Columns a chunk: 2 kB of each row in f32, so that the jump to the next row is made once for many
+/// cache lines.
 const COLUMNS: usize = 512;
 
 /// `q += sum_i factors_i table[rows_i]`, or `q = ..` where `add` is false.
@@ -132,6 +133,8 @@ unsafe fn columns_body<V: DenseLanes>(
     unsafe {
         let table = table.as_ptr();
         while column + V::COUNT <= q.len() {
+            // As many columns at once as registers allow: each pass jumps from row to row of the
+            // table.
             let registers = ((q.len() - column) / V::COUNT).min(8);
             match registers {
                 8 => register_tile::<V, 8>(table, width, column, rows, factors, add, q),

@@ -21,7 +21,9 @@ pub use some::{project_products, project_rows};
 /// Numbers stored as f32 or f16.
 #[derive(Debug, Clone, Copy)]
 pub enum Stored<'a> {
+    /// As read, or widened where a machine has no instruction that widens (WebAssembly).
     F32(&'a [f32]),
+    /// Half the memory that a step reads; each number is widened exactly when it is loaded.
     F16(&'a [f16]),
 }
 
@@ -94,6 +96,7 @@ impl BlockBasis<'_> {
 /// A run of wanted nodes in one block.
 #[derive(Debug, Clone, Copy, HeldBytes)]
 struct Run {
+    /// All of a run's nodes are of one block, so that they share its coordinates.
     block: u32,
     /// Into `RowPlan::{locals, outputs}`.
     start: u32,
@@ -103,6 +106,7 @@ struct Run {
 /// Which nodes to decode: made once a region, read each step.
 #[derive(Debug, Clone, Default, HeldBytes)]
 pub struct RowPlan {
+    /// In the order of the blocks, each of [`RUN_NODES`] nodes at most.
     runs: Vec<Run>,
     /// Node's place in its block.
     locals: Vec<u32>,
@@ -112,10 +116,12 @@ pub struct RowPlan {
     places: Vec<[u32; 2]>,
     /// Start of each block's basis; `[B + 1]`.
     basis_offsets: Vec<usize>,
+    /// Rows of the output that [`decode_rows`] takes.
     output_rows: usize,
 }
 
-/// Nodes a run at most: a chunk of work for one thread.
+/// Nodes a run at most: a chunk of work for one thread. With fewer the counter of the pool would be
+/// asked more often, with more a large block would be one thread's work alone.
 const RUN_NODES: usize = 128;
 
 impl RowPlan {

@@ -9,7 +9,8 @@ use field::memory::{self, HeldBytes};
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
 
-/// Floats a piece.
+/// Floats a piece: 16 kB, so that a piece of one vector and of the rows that meet it stay in the
+/// first and second cache; and short enough that its f32 sums keep their digits.
 const PIECE: usize = 4096;
 
 /// Partial sums of [`dots`], kept between calls.

@@ -1,4 +1,10 @@
 //! 256-bit lanes: AVX2 with FMA and F16C.
+//!
+//! Most instructions of AVX2 that move lanes about work within the two 128-bit halves of a register
+//! and never across them. So four rows of four numbers that are to become columns are loaded as
+//! rows 0 and 4 of one register, 1 and 5 of the next, and so on: an unpack and a shuffle of the
+//! halves then yield lanes 0 to 3 in the low half and 4 to 7 in the high one, in their order and
+//! without a crossing. Gathers, scatters and transposes below all do it that way.
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
@@ -11,6 +17,8 @@ use core::arch::x86_64::*;
 #[derive(Clone, Copy)]
 pub struct Avx2(__m256);
 
+/// A mask for AVX2's masked loads and stores: the sign bit is set in the first `count` lanes. The
+/// lanes behind are not accessed at all, so that they may lie beyond the end of an allocation.
 #[inline(always)]
 unsafe fn first(count: usize) -> __m256i {
     // SAFETY: see the trait.
@@ -20,13 +28,15 @@ unsafe fn first(count: usize) -> __m256i {
     }
 }
 
-/// One node.
+/// Loads one node, `[x, y, z, w]`. The index counts half nodes (8 bytes), so that the address is
+/// one operand of the load: x86 scales an index by 8, but not by 16.
 #[inline(always)]
 pub(super) unsafe fn row(nodes: *const [f32; 4], index: u16) -> __m128 {
     unsafe { _mm_loadu_ps(nodes.cast::<f64>().add(index as usize).cast()) }
 }
 
-/// Adds to one node.
+/// Adds to one node in memory. All four components are added, so `value`'s fourth decides what
+/// becomes of the node's: nobody reads it after a scatter.
 #[inline(always)]
 pub(super) unsafe fn add_row(nodes: *mut [f32; 4], index: u16, value: __m128) {
     unsafe {
@@ -44,6 +54,8 @@ unsafe fn rows(nodes: *const [f32; 4], index: *const u16, first: usize) -> __m25
     }
 }
 
+/// Adds the halves of `value` to the nodes of elements `first` and `first + 4`, one after the
+/// other: where both elements share the node, the second addition has to see the first.
 #[inline(always)]
 unsafe fn add_rows(nodes: *mut [f32; 4], index: *const u16, first: usize, value: __m256) {
     unsafe {
@@ -56,7 +68,8 @@ unsafe fn add_rows(nodes: *mut [f32; 4], index: *const u16, first: usize, value:
     }
 }
 
-/// Rows 0 and 4, 1 and 5, ... of what is scattered.
+/// Forces by axis, turned to one row of four a node: rows 0 and 4 in the halves of the first
+/// register, 1 and 5 in those of the second, 2 and 6, 3 and 7. Fourth components are copies of `z`.
 #[inline(always)]
 unsafe fn forces(value: [Avx2; 3]) -> [__m256; 4] {
     unsafe {
@@ -124,6 +137,9 @@ impl Lanes for Avx2 {
 
     #[inline(always)]
     unsafe fn min(self, other: Self) -> Self {
+        // `vminps` answers with its second operand where one is a NaN or both are zeros. With
+        // `self` in that place the result is what the trait promises: a NaN in `self` stays, one in
+        // `other` does not come in.
         unsafe { Self(_mm256_min_ps(other.0, self.0)) }
     }
 
@@ -152,6 +168,7 @@ impl FunctionLanes for Avx2 {
     #[inline(always)]
     unsafe fn scale_by_power(self, exponent: Self) -> Self {
         unsafe {
+            // The power of two is written as a number: its biased exponent alone, with no mantissa.
             let biased = _mm256_add_epi32(_mm256_cvtps_epi32(exponent.0), _mm256_set1_epi32(127));
             let power = _mm256_castsi256_ps(_mm256_slli_epi32::<23>(biased));
             Self(_mm256_mul_ps(self.0, power))
@@ -161,6 +178,9 @@ impl FunctionLanes for Avx2 {
     #[inline(always)]
     unsafe fn split(self) -> [Self; 2] {
         unsafe {
+            // Bits of a positive number grow as the number does, and a step of one in the exponent
+            // is a step of `2^23` in them. Counting such steps from the root of a half gives the
+            // power.
             let bits = _mm256_castps_si256(self.0);
             let power =
                 _mm256_srai_epi32::<23>(_mm256_sub_epi32(bits, _mm256_set1_epi32(ROOT_OF_HALF)));
@@ -206,6 +226,9 @@ impl DenseLanes for Avx2 {
     #[inline(always)]
     unsafe fn sums(four: [Self; 4]) -> [f32; 4] {
         unsafe {
+            // `hadd` adds neighbours within each half: after two of them a half holds the four sums
+            // of its lanes, and adding the halves gives
+            // `((0 + 1) + (2 + 3)) + ((4 + 5) + (6 + 7))`.
             let [a, b, c, d] = four.map(|r| r.0);
             let ab = _mm256_hadd_ps(a, b);
             let cd = _mm256_hadd_ps(c, d);
@@ -223,6 +246,8 @@ impl DenseLanes for Avx2 {
     #[inline(always)]
     unsafe fn transpose(from: *const f32, row_offset: &[usize], to: *mut f32, stride: usize) {
         unsafe {
+            // The classic 8 x 8: pairs of rows, then pairs of pairs within the halves, then the
+            // halves.
             let mut r = [_mm256_setzero_ps(); 8];
             for i in 0..8 {
                 r[i] = _mm256_loadu_ps(from.add(row_offset[i]));
@@ -300,6 +325,8 @@ impl NodeLanes for Avx2 {
     #[inline(always)]
     unsafe fn scatter_add_in_order(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
         unsafe {
+            // All low halves before all high ones: elements 0 to 7 in their order, as lanes of four
+            // have it.
             let rows = forces(value);
             for (i, row) in rows.into_iter().enumerate() {
                 add_row(nodes, *index.add(i), _mm256_castps256_ps128(row));

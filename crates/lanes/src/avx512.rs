@@ -1,4 +1,8 @@
 //! 512-bit lanes: AVX-512 F, BW, DQ, VL. Gathers are 128-bit loads and in-register transposes.
+//!
+//! The gather instruction of the set would load one number a time, and a node's four are wanted
+//! together: sixteen loads of a whole node and a transpose do the work of 64 such accesses. As in
+//! [`super::avx2`], shuffles stay within 128-bit parts, so the rows are laid out four apart.
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
@@ -12,7 +16,7 @@ use core::arch::x86_64::*;
 #[derive(Clone, Copy)]
 pub struct Avx512(pub __m512);
 
-/// Rows `i`, `i + 4`, `i + 8`, `i + 12` in the four 128-bit parts.
+/// Rows `first`, `first + 4`, `first + 8`, `first + 12` in the four 128-bit parts.
 #[inline(always)]
 unsafe fn rows(nodes: *const [f32; 4], index: *const u16, first: usize) -> __m512 {
     unsafe {
@@ -137,6 +141,8 @@ impl FunctionLanes for Avx512 {
     #[inline(always)]
     unsafe fn scale_by_power(self, exponent: Self) -> Self {
         unsafe { Self(_mm512_scalef_ps(self.0, exponent.0)) }
+        // One instruction does what the other sets build from the bits of an exponent, and has no
+        // limits of range.
     }
 
     #[inline(always)]
@@ -172,6 +178,7 @@ impl DenseLanes for Avx512 {
     #[inline(always)]
     unsafe fn load_part(from: *const f32, count: usize) -> Self {
         unsafe { Self(_mm512_maskz_loadu_ps((1u16 << count) - 1, from)) }
+        // `count < 16`, so the shift is in range; masked lanes are not accessed.
     }
 
     #[inline(always)]
@@ -195,6 +202,8 @@ impl DenseLanes for Avx512 {
                     _mm512_extractf32x8_ps::<1>(four[i].0),
                 );
             }
+            // Lanes 0 to 7 plus lanes 8 to 15 first; from there it is the tree of AVX2. A sum over
+            // sixteen lanes therefore has other bits than one over eight.
             let [a, b, c, d] = halves;
             let ab = _mm256_hadd_ps(a, b);
             let cd = _mm256_hadd_ps(c, d);
@@ -290,6 +299,8 @@ impl NodeLanes for Avx512 {
     #[inline(always)]
     unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
         unsafe {
+            // The order is 0, 4, 8, 12, 1, 5, ...: fixed, but not that of the elements. Portable
+            // models never run on these lanes ([`crate::Portable`]).
             let [Self(x), Self(y), Self(z)] = value;
             let xy01 = _mm512_unpacklo_ps(x, y);
             let xy23 = _mm512_unpackhi_ps(x, y);

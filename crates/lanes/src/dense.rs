@@ -1,4 +1,8 @@
-//! Parts of a register.
+//! Parts of a register: the ends of rows whose length is no multiple of the lanes.
+//!
+//! Masked loads and stores are slower than plain ones on some machines, and copies through the
+//! stack where there are no masks; these two take the plain way wherever a whole register is there.
+//! A lane behind `count` is zero, and so adds nothing to a sum of products.
 
 use super::DenseLanes;
 

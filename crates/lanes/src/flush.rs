@@ -9,11 +9,16 @@ use std::marker::PhantomData;
 
 /// A saved mode. It must be dropped on the thread that made it, hence it is not `Send`.
 struct Saved {
+    /// The mode of before: MXCSR in the low 32 bits, or FPCR.
     word: u64,
+    /// A pointer is not `Send`, and so the guard cannot be moved to a thread whose mode it would
+    /// overwrite.
     not_send: PhantomData<*const ()>,
 }
 
 impl Saved {
+    /// Saves the word and sets the changed one. Guards nest: each puts back what it found, so they
+    /// have to be dropped in reverse order, as values of a scope are.
     fn change(change: impl FnOnce(u64) -> u64) -> Self {
         let word = read_mode();
         write_mode(change(word));
@@ -34,6 +39,8 @@ impl Drop for Saved {
 
 thread_local! {
     /// Exceptions that computations of this thread have met, as bits of the mode word.
+    /// They are collected only to be looked at: tests assert that a step raises no invalid
+    /// operation, since the host's own status flags are put back and tell nothing. On x86-64 alone.
     pub static RAISED: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
 }
 

@@ -1,11 +1,18 @@
 //! Elementary functions of f32 lanes, within two units in the last place (f32) over the ranges that each states.
 //!
+//! Each function brings its argument into a short interval, where a polynomial of a few terms is
+//! good to f32, and puts back what was taken off: `e^x = 2^n e^r` with `|r| <= ln 2 / 2`,
+//! `ln(2^n m) = n ln 2 + ln m` with `m` near one. There are no branches, as lanes cannot take
+//! different ones: arguments beyond the range are clamped. The laws of the elements call them.
+//!
 //! Polynomials of the exponential and the logarithm: Moshier, *Cephes Mathematical Library*, `expf.c` and `logf.c`; of the arc
 //! cosine: Abramowitz and Stegun, *Handbook of Mathematical Functions*, 4.4.46.
 
 use crate::FunctionLanes;
 
-/// `ln 2` in two parts, the first of few bits.
+/// `ln 2` in two parts, of which the first has nine bits: its product with a power of two's
+/// exponent, which has eight, is exact in f32. The second carries the remaining digits, so that
+/// `x - n ln 2` loses nothing where the two nearly cancel (Cody and Waite's reduction).
 const LN2: [f32; 2] = [355.0 / 512.0, -2.121_944_4e-4];
 
 /// `sum c_k x^k`, the coefficients from the highest power down.
@@ -32,10 +39,12 @@ unsafe fn horner<L: FunctionLanes, const N: usize>(coefficients: [f32; N], x: L)
 pub unsafe fn exp_m1<L: FunctionLanes>(x: L) -> L {
     // SAFETY: the caller's.
     unsafe {
+        // Within these the exponent stays in -126..=127, which is what `scale_by_power` can write.
         let x = x.max(L::splat(-87.0)).min(L::splat(88.0));
         let whole = x.mul(L::splat(std::f32::consts::LOG2_E)).round();
         let rest = whole.neg_mul_add(L::splat(LN2[0]), x);
         let rest = whole.neg_mul_add(L::splat(LN2[1]), rest);
+        // `(e^r - 1 - r) / r^2`, so that the leading term is `r` itself and keeps all of its bits.
         let series = horner(
             [
                 1.987_569_1e-4,
@@ -64,10 +73,13 @@ pub unsafe fn ln_1p<L: FunctionLanes>(x: L) -> L {
     // SAFETY: the caller's.
     unsafe {
         let one = L::splat(1.0);
+        // The smallest normal number in place of zero: a subnormal one has no exponent to split
+        // off.
         let sum = x.add(one).max(L::splat(f32::MIN_POSITIVE));
         // What the sum has lost, and that over the sum: the logarithm's change to first order.
         let lost = x.sub(sum.sub(one));
         let [mantissa, power] = sum.split();
+        // From the root of a half to that of two, so that `f` is between -0.3 and 0.42.
         let f = mantissa.sub(one);
         let square = f.mul(f);
         let series = horner(
@@ -85,6 +97,7 @@ pub unsafe fn ln_1p<L: FunctionLanes>(x: L) -> L {
             f,
         );
         let small = series.mul(square).mul(f);
+        // The small terms are added first and `f` and the large part of `n ln 2` last.
         let small = power.mul_add(L::splat(LN2[1]), small);
         let small = square.mul_add(L::splat(-0.5), small);
         let small = small.add(lost.div(sum));
@@ -101,6 +114,7 @@ pub unsafe fn third_of_angle<L: FunctionLanes>(c: L) -> [L; 2] {
     // SAFETY: the caller's.
     unsafe {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        // The formula is for arguments from 0 to 1; `acos(-c) = pi - acos(c)` gives the others.
         let size = c.max(zero.sub(c));
         let series = horner(
             [

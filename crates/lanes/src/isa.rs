@@ -27,6 +27,8 @@ static BEST: OnceLock<Isa> = OnceLock::new();
 
 impl Isa {
     /// Every set, slowest first.
+    /// [`Isa::detect`] takes the last that the machine has, so the portable ones stand before
+    /// [`Isa::Scalar`]: nobody gets them who did not ask.
     const ALL: [Isa; 7] = [
         Isa::PortableScalar,
         Isa::Portable,
@@ -39,6 +41,7 @@ impl Isa {
 
     /// The best of this machine. The environment variable `UPT_ISA` (`scalar`, `neon`, `avx2`,
     /// `avx512`, `simd128`, `portable`, `portable-scalar`) lowers it, for comparisons; a set that the machine lacks is ignored.
+    /// All scenes of a process see the same answer, whichever thread asks first.
     pub fn detect() -> Self {
         *BEST.get_or_init(|| {
             let asked = std::env::var("UPT_ISA").ok().and_then(|s| Self::parse(&s));
@@ -51,6 +54,8 @@ impl Isa {
 
     /// The set for the same bits on every machine: [`Isa::Portable`], or [`Isa::PortableScalar`] where the machine lacks that or `UPT_ISA`
     /// is `scalar`.
+    /// Steps of a model that was opened with the option `portable` run on it
+    /// (docs/decisions/041-portable-bits.md).
     pub fn portable() -> Self {
         match Isa::detect() {
             Isa::Scalar | Isa::PortableScalar if Isa::PortableScalar.is_available() => {
@@ -145,6 +150,8 @@ impl Isa {
 /// Defines `fn name(isa, args..)`: the scalar function for `Isa::Scalar`, else `body::<Lanes>`
 /// compiled with the instruction set's features, and for the portable ones `body` in any case. An `Isa` that the machine lacks takes a scalar
 /// path, so the function is safe to call with any value.
+/// `body` has to be `#[inline(always)]`: compiled on its own it would have the target's baseline
+/// alone, and each of its lanes would be a call of a function.
 #[macro_export]
 macro_rules! by_isa {
     ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident : $ty:ty),* $(,)?) = $body:ident, $scalar:ident;) => {

@@ -66,6 +66,7 @@ const HAS_LANES: bool = cfg!(any(
 ));
 
 /// Asks for a value's cache lines; the pointer may be beyond any allocation.
+/// It is a hint: nothing is read, and on other processors than x86-64 nothing is done.
 #[inline(always)]
 pub fn prefetch<T>(value: *const T) {
     #[cfg(target_arch = "x86_64")]

@@ -1,4 +1,10 @@
 //! 128-bit lanes: Advanced SIMD of AArch64.
+//!
+//! The set has no masked loads, so parts of a register go through an array on the stack. It has
+//! fused multiply-adds and an instruction for everything else that the traits ask for, but its own
+//! minimum and maximum are not used here: they order the two zeros and let any NaN through, and
+//! portable models, which compute with [`crate::Pair`] of these lanes, must give the bits of
+//! x86-64.
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
@@ -100,6 +106,8 @@ impl Lanes for Neon {
 
     #[inline(always)]
     unsafe fn min(self, other: Self) -> Self {
+        // Compare and select, as `other < self ? other : self`: a comparison with a NaN is false,
+        // which keeps `self`, and equal zeros keep `self` too.
         unsafe { Self(vbslq_f32(vcltq_f32(other.0, self.0), other.0, self.0)) }
     }
 
@@ -142,6 +150,7 @@ impl FunctionLanes for Neon {
     #[inline(always)]
     unsafe fn all_below(self, limit: Self) -> bool {
         unsafe { vminvq_u32(vcltq_f32(self.0, limit.0)) == u32::MAX }
+        // A lane of the mask is all ones or zero, so the least of them says whether all hold.
     }
 }
 
@@ -168,6 +177,9 @@ impl DenseLanes for Neon {
     #[inline(always)]
     unsafe fn load_f16(from: *const half::f16) -> Self {
         unsafe {
+            // Inline assembly, since the intrinsic for this instruction takes Rust's own type
+            // `f16`, which a stable compiler does not have. Every AArch64 has `fcvtl`, and it is
+            // exact.
             let bits = vld1_u16(from.cast());
             let wide: float32x4_t;
             core::arch::asm!(
@@ -183,6 +195,8 @@ impl DenseLanes for Neon {
     #[inline(always)]
     unsafe fn sums(four: [Self; 4]) -> [f32; 4] {
         unsafe {
+            // Pairwise additions: `(0 + 1) + (2 + 3)` of each register, the lower half of AVX2's
+            // tree.
             let [a, b, c, d] = four.map(|r| r.0);
             let sum = vpaddq_f32(vpaddq_f32(a, b), vpaddq_f32(c, d));
             let mut out = [0.0; 4];
@@ -243,6 +257,7 @@ impl NodeLanes for Neon {
     #[inline(always)]
     unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
         unsafe {
+            // The fourth row of the transpose may be anything; `z` again saves a register of zeros.
             let nodes = nodes.cast::<f64>();
             let rows = transpose([value[0].0, value[1].0, value[2].0, value[2].0]);
             for (i, row) in rows.into_iter().enumerate() {

@@ -1,4 +1,11 @@
 //! Four registers of Advanced SIMD as one.
+//!
+//! Elements of a mesh come in batches of [`WIDTH`], and this type takes a whole batch. The four
+//! parts do not depend on each other, so a core with several vector units works on all of them
+//! while one waits for its result. Loops over the parts are written out where the compiler would
+//! otherwise keep the array in memory. The type serves the elements alone: it has no
+//! [`super::DenseLanes`], and its minimum and maximum are the instructions of the set, which order
+//! zeros and let a NaN of either side through; portable models do not compute with it.
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"

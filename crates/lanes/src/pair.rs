@@ -1,4 +1,9 @@
 //! Two registers as one, of twice the lanes: eight where the machine has four.
+//!
+//! [`crate::Isa::Portable`] is eight lanes on every machine, because the number of lanes decides
+//! how a sum is split up and hence its last bits. On AArch64 and in WebAssembly a register has
+//! four, and two of them make a pair. Lane `i` of the pair is lane `i` of the first register for
+//! `i < 4` and lane `i - 4` of the second one otherwise, in memory and in every function.
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: that of the lanes within"
@@ -10,7 +15,8 @@ use super::{DenseLanes, FunctionLanes, Lanes, NodeLanes, load_some, store_some};
 #[derive(Clone, Copy)]
 pub struct Pair<L>(L, L);
 
-/// Functions that go by half.
+/// Functions of each lane alone: the pair's result is that of the first halves and that of the
+/// second halves, and no lane meets one of the other register.
 macro_rules! by_half {
     ($(fn $name:ident(self $(, $with:ident)*);)*) => {
         $(
@@ -85,6 +91,8 @@ impl<L: DenseLanes> DenseLanes for Pair<L> {
     #[inline(always)]
     unsafe fn load_part(from: *const f32, count: usize) -> Self {
         unsafe {
+            // A whole first half needs the full load, since `load_part` is for fewer lanes than a
+            // register has; [`load_some`] chooses.
             let first = count.min(L::COUNT);
             let second = match count > first {
                 true => load_some(from.add(first), count - first),
@@ -113,6 +121,8 @@ impl<L: DenseLanes> DenseLanes for Pair<L> {
     #[inline(always)]
     unsafe fn sums(four: [Self; 4]) -> [f32; 4] {
         unsafe {
+            // Each half by its own tree, then the two: with four lanes a half this is AVX2's tree
+            // over eight, to the bit.
             let [a, b, c, d] = four;
             let first = L::sums([a.0, b.0, c.0, d.0]);
             let second = L::sums([a.1, b.1, c.1, d.1]);
@@ -127,6 +137,8 @@ impl<L: DenseLanes> DenseLanes for Pair<L> {
     #[inline(always)]
     unsafe fn transpose(from: *const f32, row_offset: &[usize], to: *mut f32, stride: usize) {
         unsafe {
+            // Four blocks of half the size: rows of the first and second half, by columns of the
+            // first and second half.
             let half = L::COUNT;
             for (rows, to) in [
                 (&row_offset[..half], to),
@@ -159,6 +171,8 @@ impl<L: NodeLanes> NodeLanes for Pair<L> {
     #[inline(always)]
     unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
         unsafe {
+            // The first half has been added before the second is loaded, so an element of the
+            // second half that shares a node sees the sum.
             let [x, y, z] = value;
             L::scatter_add(nodes, index, [x.0, y.0, z.0]);
             L::scatter_add(nodes, index.add(L::COUNT), [x.1, y.1, z.1]);

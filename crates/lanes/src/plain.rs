@@ -9,11 +9,12 @@
 
 use super::{DenseLanes, FunctionLanes, Lanes, NodeLanes};
 
-/// `L` without fused multiply-adds.
+/// `L` without fused multiply-adds. The wrapper has the layout of a register and disappears when it
+/// is compiled: what remains is a product and a sum where the inner lanes have one instruction.
 #[derive(Clone, Copy)]
 pub struct Plain<L>(L);
 
-/// Functions that are those of the lanes within.
+/// Functions that IEEE 754 defines to the bit, or that move lanes about: those of the lanes within.
 macro_rules! as_within {
     ($(fn $name:ident(self $(, $with:ident)*);)*) => {
         $(
@@ -56,6 +57,8 @@ impl<L: Lanes> Lanes for Plain<L> {
 
     #[inline(always)]
     unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        // Rust never contracts a product and a sum by itself, so the product is rounded here on
+        // every machine. It is why these are two calls and must stay so.
         unsafe { Self(self.0.mul(a.0).add(b.0)) }
     }
 
@@ -144,6 +147,8 @@ impl<L: NodeLanes> NodeLanes for Plain<L> {
 
     #[inline(always)]
     unsafe fn scatter_add(nodes: *mut [f32; 4], index: *const u16, value: [Self; 3]) {
+        // In the order of the elements: nodes that several elements share add up the same way on
+        // sets of four lanes and of eight.
         let [x, y, z] = value;
         unsafe { L::scatter_add_in_order(nodes, index, [x.0, y.0, z.0]) }
     }

@@ -1,4 +1,8 @@
 //! Plain arrays: the readable reference, and the fallback of any processor.
+//!
+//! What a function of the traits means is said best by its body here; the other files only say it
+//! in the instructions of a set. `Scalar<16>` goes with a batch of elements, `Scalar<8>` with the
+//! portable set on an x86-64 processor without AVX2, where it has the bits of [`crate::Portable`].
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: the instruction set is enabled in the caller, and pointers hold what the shapes say"
@@ -11,6 +15,7 @@ use super::{DenseLanes, FunctionLanes, Lanes, NodeLanes, ROOT_OF_HALF, WIDTH};
 pub struct Scalar<const N: usize = WIDTH>([f32; N]);
 
 impl<const N: usize> Scalar<N> {
+    /// `f` of the two numbers of each lane.
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
@@ -59,6 +64,8 @@ impl<const N: usize> Lanes for Scalar<N> {
 
     #[inline(always)]
     unsafe fn mul_add(self, b: Self, c: Self) -> Self {
+        // Two roundings: `f32::mul_add` would be one, but a call of a function in software where
+        // the target has no such instruction.
         self.zip(b, |x, y| x * y).zip(c, |x, y| x + y)
     }
 
@@ -69,6 +76,8 @@ impl<const N: usize> Lanes for Scalar<N> {
 
     #[inline(always)]
     unsafe fn min(self, other: Self) -> Self {
+        // Not `f32::min`, which drops a NaN in `self`: a NaN has to reach the guard that refuses
+        // it.
         self.zip(other, |a, b| if b < a { b } else { a })
     }
 
@@ -183,11 +192,13 @@ impl<const N: usize> NodeLanes for Scalar<N> {
 
     #[inline(always)]
     unsafe fn fourth(self) -> Self {
+        // Lane `4 g + 3` is the fourth component of the node that lanes `4 g ..= 4 g + 3` hold.
         Self(std::array::from_fn(|i| self.0[i | 3]))
     }
 
     #[inline(always)]
     unsafe fn gather(nodes: *const [f32; 4], index: *const u16) -> [Self; 4] {
+        // An index counts half nodes and is always even.
         let values: [[f32; 4]; N] =
             std::array::from_fn(|i| unsafe { *nodes.add(*index.add(i) as usize / 2) });
         [0, 1, 2, 3].map(|axis| Self(std::array::from_fn(|i| values[i][axis])))

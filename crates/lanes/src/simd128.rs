@@ -1,4 +1,8 @@
 //! 128-bit lanes: SIMD of WebAssembly. A multiply-add rounds twice, so that the same module gives the same bits everywhere.
+//!
+//! The fused form of `relaxed-simd` may round once or twice as the browser likes, and software that
+//! rounds once took 37 % of a step (docs/decisions/025-web.md). A module is compiled with simd128
+//! or without; it cannot ask at run time, so there is nothing to detect.
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: the module is compiled with the feature, and pointers hold what the shapes say"
@@ -78,6 +82,8 @@ impl Lanes for Simd128 {
 
     #[inline(always)]
     unsafe fn min(self, other: Self) -> Self {
+        // `pmin` is `other < self ? other : self`, the trait's rule; the plain `min` lets any NaN
+        // through.
         Self(f32x4_pmin(self.0, other.0))
     }
 

@@ -1,12 +1,18 @@
 //! What kernels need of a register.
 
-/// Elements of a mesh in a batch.
+/// Elements of a mesh in a batch. It is the width of the widest register (AVX-512) and a multiple
+/// of all others, so that a batch is a whole number of registers on every machine and its layout in
+/// memory does not depend on the instruction set.
 pub const WIDTH: usize = 16;
 
-/// Constant of the inverse cube root's first guess, `bits(y) = GUESS - bits(x) / 3`.
+/// Constant of the inverse cube root's first guess, `bits(y) = GUESS - bits(x) / 3`. The bits of a
+/// positive number are nearly linear in its logarithm, so dividing them by -3 nearly takes the
+/// power -1/3; the constant sets the offset of the exponents right. The polynomial that follows in
+/// the elements' kernel was fitted to the error of this very guess.
 pub const CUBE_ROOT_GUESS: f32 = 1_419_967_116.0;
 
-/// Bits of the root of a half, where [`FunctionLanes::split`] turns to the next power of two.
+/// Bits of the root of a half, where [`FunctionLanes::split`] turns to the next power of two: the
+/// mantissa is then as near to one as it can be, and a logarithm's series as short.
 pub(crate) const ROOT_OF_HALF: i32 = 0x3F35_04F3;
 
 /// Arithmetic on `COUNT` f32 lanes.

@@ -1,4 +1,9 @@
 //! Dense kernels of a front, upper triangle, row-major.
+//!
+//! A front of width `w` with `p` own rows costs up to `p w^2 / 2` multiply-adds, most of the work
+//! of a factor. [`eliminate`] works in panels of [`PANEL`] rows so that each entry below is loaded
+//! and stored once for eight rows of `U`. The solves read `U` once each and are bound by memory. An
+//! entry below the diagonal is never read, so products may write there what they like.
 
 use lanes::{DenseLanes, load_some, store_some};
 
@@ -56,6 +61,8 @@ unsafe fn eliminate_lanes<V: DenseLanes>(
                 }
             }
             let mut row = end;
+            // A tile of four rows begins at the diagonal of the first: of the later rows it also
+            // writes a few entries below theirs, which nobody reads.
             while row + ROWS <= width {
                 take_off::<V, ROWS, REGISTERS>(a, width, first..end, row, row);
                 row += ROWS;
@@ -176,6 +183,7 @@ fn back_plain(upper: &[f32], width: usize, x: &mut [f32]) {
             }
         }
         let mut sum: f32 = rest.iter().zip(rest_x).map(|(a, b)| a * b).sum();
+        // Halves are folded onto each other: a fixed tree, whatever the compiler makes of it.
         let mut half = LANES / 2;
         while half > 0 {
             for lane in 0..half {

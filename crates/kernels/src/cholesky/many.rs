@@ -1,13 +1,18 @@
 //! Kernels of a front for [`SIDES`] right sides at once, and the room for these.
+//!
+//! With one right side a solve reads two numbers of `U` for each multiply-add pair and waits for
+//! memory. With [`SIDES`] of them, one to a lane, each number that is read serves sixteen. Sides
+//! never meet: what one gives does not depend on the others, nor on how many there are.
 
 use lanes::{DenseLanes, by_isa};
 
 use field::error::Result;
 use field::memory::{self, HeldBytes};
 
-/// Right sides that go through together.
+/// Right sides that go through together: one AVX-512 register, and a multiple of every other.
 pub const SIDES: usize = 16;
-/// Rows of `U` that go through together.
+/// Rows of `U` that go through together: eight sums in registers, and room for the operands in the
+/// sixteen registers of AVX2.
 const PANEL: usize = 8;
 
 /// One value of each right side.
@@ -102,6 +107,8 @@ unsafe fn forward_body<V: DenseLanes>(upper: &[f32], width: usize, count: usize,
                     y[k] = value.mul(V::splat(u(row, row)));
                     y[k].store(x(row));
                 }
+                // Written twice so that the count is a constant in the common case and the loop
+                // unrolls.
                 if rows == PANEL {
                     for column in first + PANEL..width {
                         let mut value = V::load(x(column));

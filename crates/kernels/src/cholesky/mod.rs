@@ -26,8 +26,11 @@ const NONE: u32 = u32::MAX;
 /// are left out by the factor.
 #[derive(Default, HeldBytes)]
 pub struct BlockRows {
+    /// Where each row begins in the other two lists, `[rows + 1]`; the first is 0.
     pub starts: Vec<u32>,
+    /// Nodes, `[starts[rows]]`.
     pub columns: Vec<u32>,
+    /// Both triangles are stored; the factor reads what its order makes the upper one.
     pub blocks: Vec<[f32; 9]>,
 }
 
@@ -54,6 +57,7 @@ pub struct SparseFactor {
     order: Vec<u32>,
     places: Vec<u32>,
     /// In the order of elimination.
+    /// Children come before their parent (postorder), so one pass over the list factors.
     fronts: Vec<Front>,
     /// Places beyond each front's own that it is coupled with, ascending.
     borders: Vec<u32>,
@@ -68,6 +72,8 @@ pub struct SparseFactor {
 #[derive(Default, HeldBytes)]
 struct Room {
     /// The front being eliminated, and what is left of those that wait for their parents.
+    /// `front` is `[widest, widest]`, of which a smaller front takes the beginning. `waiting` is a
+    /// stack, on top of which the children of a front lie when its turn comes.
     front: Vec<f32>,
     waiting: Vec<f32>,
     /// By place: its index in the front, while it is put together.
@@ -81,6 +87,8 @@ struct Room {
 impl Room {
     /// For a matrix of `rows`, whose widest front has `widest`, of whose fronts `most_waiting` values wait at once.
     fn fit(&mut self, rows: usize, widest: usize, most_waiting: usize) -> Result<()> {
+        // Everything is reserved here, at the deepest that the stack will ever be: `factor` and
+        // `solve` run within a step, where nothing may be allocated.
         self.waiting.clear();
         memory::fit(&mut self.waiting, most_waiting, WHAT)?;
         self.front.clear();
@@ -168,6 +176,9 @@ impl SparseFactor {
     }
 
     /// The border of each front: what its own nodes and its children's borders are coupled with.
+    /// When a child's nodes are gone, their later neighbours are all coupled with each other, so
+    /// the parent takes over its border. `local` marks by the front's number which places are
+    /// listed.
     fn find_borders(&mut self, matrix: &BlockRows) -> Result<()> {
         for at in 0..self.fronts.len() {
             let front = &self.fronts[at];
@@ -228,6 +239,8 @@ impl SparseFactor {
         true
     }
 
+    /// Its rows of the matrix and what its children have left are added up, its own nodes are
+    /// eliminated, and what is left of its border goes onto the stack for the parent.
     fn eliminate(&mut self, isa: Isa, matrix: &BlockRows, at: usize) -> bool {
         let front = &self.fronts[at];
         let (own, border) = (front.own as usize, front.border as usize);
@@ -272,6 +285,8 @@ impl SparseFactor {
             let base = self.room.waiting.len() - 9 * count * count;
             let left = &self.room.waiting[base..];
             let dense = &mut self.room.front[..width * width];
+            // Extend-add: the child's border is part of this front, in the same ascending order, so
+            // its upper triangle falls into this front's.
             for (i, &place) in places.iter().enumerate() {
                 let row = 3 * self.room.local[place as usize] as usize;
                 for axis in 0..3 {
@@ -292,6 +307,7 @@ impl SparseFactor {
         eliminate(isa, dense, width, 3 * own, &mut is_positive);
         let upper = &mut self.upper[front.upper..][..3 * own * width];
         upper.copy_from_slice(&dense[..3 * own * width]);
+        // A square block of the border alone; what is below its diagonal is not read.
         for row in dense[3 * own * width..].chunks_exact(width) {
             self.room.waiting.extend_from_slice(&row[3 * own..]);
         }

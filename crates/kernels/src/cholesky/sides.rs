@@ -1,4 +1,7 @@
 //! Several right sides at once: the factor is read once for [`SIDES`] of them.
+//!
+//! The same two passes as [`SparseFactor::solve`], on rows of sixteen numbers in place of one. The
+//! last group may have fewer sides; its other lanes are zeros and stay so.
 
 use lanes::Isa;
 
@@ -22,12 +25,15 @@ impl SparseFactor {
         }
     }
 
+    /// Up to [`SIDES`] right sides of `len = 3 rows` numbers each.
     fn solve_sides(&mut self, isa: Isa, x: &mut [f32], len: usize) {
         let count = x.len() / len;
         let ManySides { permuted, gathered } = &mut self.room.many;
         permuted.fill([0.0; SIDES]);
         for (side, x) in x.chunks_exact(len).enumerate() {
             for (node, values) in x.as_chunks::<3>().0.iter().enumerate() {
+                // The room was just set to zeros; right sides of contacts are zero at almost all
+                // nodes.
                 if *values != [0.0; 3] {
                     let place = 3 * self.places[node] as usize;
                     for (axis, value) in values.iter().enumerate() {

@@ -1,4 +1,7 @@
 //! Products with a factor and with itself: `R^-T Z`, and `A -= scale Z^T Z` in tiles that stay in registers.
+//!
+//! With `A_CC = U^T U`, `Z^T A_CC^-1 Z = (U^-T Z)^T (U^-T Z)`: the first function makes the
+//! bracket, the second the product of it with itself, of which the upper triangle is enough.
 
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
@@ -69,6 +72,8 @@ unsafe fn gram_body<V: DenseLanes>(z: &[f64], columns: usize, scale: f64, upper:
     let mut i = 0;
     while i + 4 <= n {
         let rows = &mut upper[i * n..][..4 * n];
+        // Wide tiles while they fit, narrow ones to the end of the row: which of them takes a
+        // number decides nothing, see above.
         let mut j = i;
         while j + 16 <= n {
             subtract_scaled_tile::<V, 4, 16>(z, rows, n, i, j, scale);
@@ -95,6 +100,7 @@ unsafe fn gram_body<V: DenseLanes>(z: &[f64], columns: usize, scale: f64, upper:
 
 /// `rows[r][j + c] -= scale sum_k block[k][i + r] * block[k][j + c]` for an `R x C` tile in registers.
 #[inline(always)]
+/// Slices of constant length take the checks of bounds out of the inner loops.
 pub(super) fn subtract_scaled_tile<V: DenseLanes, const R: usize, const C: usize>(
     block: &[f64],
     rows: &mut [f64],

@@ -1,13 +1,20 @@
 //! `A = U^T U` of a dense block, in place, in its upper triangle, row-major f64; and `U^T U x = b`.
+//!
+//! Left rows first: a block of [`BLOCK`] rows is factored, then taken off everything below it.
+//! Golub and Van Loan, *Matrix Computations*, 4.2, in its blocked outer-product form. Pivots are
+//! not exchanged, for the matrix is positive definite but for rounding; a pivot that drowns in the
+//! rounding of its own diagonal ends the attempt, and the caller adds a Tikhonov term.
 
 use super::gram::subtract_scaled_tile;
 use crate::math::fused;
 use lanes::DenseLanes;
 use lanes::by_isa;
 
-/// Pivots below this part of their diagonal are rounding noise of the f32 compliance.
+/// Pivots below this part of their diagonal are rounding noise of the f32 compliance, whose unit
+/// roundoff is 6e-8: seventeen times that is left for the sums that made its entries.
 const PIVOT_FLOOR: f64 = 1e-6;
-/// Rows factored before the rest is updated.
+/// Rows factored before the rest is updated: 24 rows of a block of some hundred columns stay in the
+/// first-level cache while all rows below read them.
 const BLOCK: usize = 24;
 
 /// Whether a pivot stands out of the rounding of its diagonal `pivot + removed`; a NaN does not.
@@ -95,6 +102,7 @@ fn factor_rows<V: DenseLanes>(a: &mut [f64], n: usize, start: usize, end: usize)
         let row = &mut above[k * n..];
         let inverse = 1.0 / pivot.sqrt();
         row[k..].iter_mut().for_each(|x| *x *= inverse);
+        // Rows of the same block are updated at once; those below wait for the whole block.
         for i in k + 1..end {
             let factor = row[i];
             let to = &mut below[(i - k - 1) * n..][i..n];

@@ -64,11 +64,17 @@ pub(super) fn is_built_in() -> bool {
 
 /// Shapes of the eight tiles: 16 rows of 64 bytes each.
 #[repr(C, align(64))]
+/// The 64 bytes that `ldtilecfg` reads (Intel SDM, volume 1, "Programming with Intel AMX").
 struct Shapes {
+    /// 1: eight tiles of up to 16 rows of 64 bytes.
     palette: u8,
+    /// Where an interrupted load goes on; 0 of a fresh one.
     start_row: u8,
+    /// Must be zeros.
     reserved: [u8; 14],
+    /// By tile; the last eight are unused and zero.
     row_bytes: [u16; 16],
+    /// By tile likewise.
     rows: [u8; 16],
 }
 
@@ -94,6 +100,8 @@ static SHAPES: Shapes = {
 pub(super) struct Sums(pub(super) [[f32; NODES]; OUTPUTS]);
 
 /// The tiles of this thread, configured until it is dropped.
+/// Tiles are state of the thread. It is not kept over a call: a thread with live tiles has eight
+/// kilobytes more to save at each switch.
 pub(super) struct Tiles(());
 
 impl Tiles {
@@ -126,6 +134,8 @@ impl Tiles {
                 "tilezero tmm0",
                 "tilezero tmm1",
                 "tilezero tmm2",
+                // One tile of weights meets three of nodes in each turn: four loads for three
+                // products.
                 "2:",
                 "tileloadd tmm3, [{w} + {line}]",
                 "tileloadd tmm4, [{x} + {row}]",

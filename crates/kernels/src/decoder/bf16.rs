@@ -53,7 +53,9 @@ mod x86 {
     use half::bf16;
     use lanes::Avx512;
 
+    /// The vector half of the file is AVX-512 alone.
     type V = Avx512;
+    /// Registers of nodes.
     const C: usize = NODES / 16;
 
     /// The layers of [`super::super::tile`] with the products in bf16. Before each product its input is narrowed into the
@@ -84,6 +86,7 @@ mod x86 {
             gather::<V>(queries, rows, 2 * h, 0, h, stream);
             gather::<V>(queries, rows, 2 * h, h, h, input);
             let width = h / decoder.heads;
+            // Configured once a tile of nodes and released when `tiles` is dropped at the end.
             let tiles = matrix_tiles.then(|| Tiles::configure());
             // Both ways take the same pairs and end with the same `finish`; they add up in another order.
             let multiply = |weights: Narrow<'_>, depth, y, finish| match &tiles {
@@ -121,6 +124,8 @@ mod x86 {
     /// `x [depth][NODES]` f32 to `[depth/2][NODES][2]` bf16, and zeros up to a whole tile.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,f16c")]
+    /// Rounds to the nearest even. An odd depth is filled up with a feature of zeros, which meets
+    /// weights of zeros.
     unsafe fn pair(x: *const f32, depth: usize, to: *mut u32) {
         for k in (0..depth.next_multiple_of(DEPTH)).step_by(2) {
             for c in 0..C {
@@ -152,6 +157,8 @@ mod x86 {
     /// `y = finish(W x)`: [`super::super::gemm::multiply`] on pairs.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx2,fma,f16c")]
+    /// A 32-bit lane of a node holds two features; the weight is the pair of the same two,
+    /// broadcast.
     unsafe fn multiply_pairs(
         panels: &[bf16],
         depth: usize,
@@ -210,6 +217,8 @@ mod x86 {
                 tiles.multiply(panel.as_ptr(), x, steps, &mut sums);
                 for half in 0..OUTPUTS / GROUP {
                     let row = block * OUTPUTS + half * GROUP;
+                    // Blocks have sixteen outputs, layers a multiple of eight: half a block may be
+                    // beyond.
                     if row >= weights.outputs {
                         break;
                     }

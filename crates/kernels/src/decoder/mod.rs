@@ -45,7 +45,10 @@ pub enum DecoderRows<'a> {
 /// Working memory of the threads, made once; `len` grows with the model's widths only.
 #[derive(Debug, Default, HeldBytes)]
 pub struct DecoderScratch {
+    /// One part after another, a part a worker: `[threads * a_worker]`. Cache lines, so that loads
+    /// are aligned and no two workers write to one line.
     blocks: Vec<CacheLine>,
+    /// Lines of a worker's part.
     a_worker: usize,
 }
 
@@ -138,6 +141,8 @@ pub fn decode(
     );
     let tiles = precision == DecoderPrecision::Bf16Tiles && isa == Isa::Avx512;
     let vectors = precision == DecoderPrecision::Bf16Vectors && isa == Isa::Avx512;
+    // What the machine or the system lacks falls back to f32 without an error: the option is a
+    // wish.
     let bf16 = tiles && amx::is_available() || vectors && Isa::has_bf16();
     let nodes = if bf16 { amx::NODES } else { tile::nodes(isa) };
     let (parts, a_worker) = (Parts::new(out), scratch.a_worker);

@@ -1,10 +1,15 @@
 //! Matrices in the order in which the micro-kernels read them: groups of eight outputs, in float32 and in pairs of bf16, and blocks of the
+//!
+//! The kernel walks a packed matrix from its first number to its last, once a tile of nodes, so the
+//! processor's prefetcher always knows what comes next. Weights are packed once a model, keys and
+//! values once a step. Padding is zeros: an output that does not exist is computed and dropped.
 //! matrix tiles.
 
 use super::amx;
 use half::bf16;
 
-/// Outputs a group.
+/// Outputs a group: eight by three registers of nodes are 24 sums, which leaves eight of AVX-512's
+/// 32 registers for operands. Smaller sets take a group in two parts of four.
 pub(super) const GROUP: usize = 8;
 
 /// Numbers of a matrix `[outputs,depth]` in panels, `[outputs/8][depth][8]`: the last group is whole, with zeros for

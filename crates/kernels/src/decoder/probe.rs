@@ -7,12 +7,18 @@ use super::pack::panel_floats;
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
 
+/// Outputs and depth of the product: a layer's usual width, 64 kB of weights that stay in the
+/// second-level cache.
 const WIDTH: usize = 128;
 
 /// Buffers of the product.
 pub struct GemmProbe {
+    /// Panels of a matrix `[WIDTH,WIDTH]`; every number is the same, for rates do not depend on
+    /// them.
     weights: Vec<f32>,
+    /// `[WIDTH][nodes]`, with room for the largest tile.
     input: Vec<CacheLine>,
+    /// As `input`.
     output: Vec<CacheLine>,
 }
 

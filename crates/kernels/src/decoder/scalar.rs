@@ -3,7 +3,7 @@
 use super::weights::{DecoderTokens, Linear, PackedDecoder};
 use crate::gelu;
 
-/// LayerNorm's eps.
+/// LayerNorm's eps, that of the networks that are trained (training/upt_training/layers.py).
 pub(super) const EPS: f32 = 1e-6;
 
 /// `queries [n,2h]`, `rows` the tile's nodes, `out [3][rows]`.
@@ -41,6 +41,7 @@ fn node(decoder: &PackedDecoder, tokens: &DecoderTokens, x: &[f32], q: &[f32]) -
 }
 
 /// `softmax(q K^T) V` for each head; the scale and `log2 e` are in the keys.
+/// Heads are parts of the feature axis, `h / heads` wide, and do not meet before the layer behind.
 fn attention(decoder: &PackedDecoder, tokens: &DecoderTokens, q: &[f32]) -> Vec<f32> {
     let (h, width) = (decoder.hidden, decoder.hidden / decoder.heads);
     let mut out = vec![0.0; h];
@@ -51,6 +52,7 @@ fn attention(decoder: &PackedDecoder, tokens: &DecoderTokens, q: &[f32]) -> Vec<
             .chunks_exact(h)
             .map(|key| dot(&key[part.clone()], &q[part.clone()]))
             .collect();
+        // The largest score is taken off, as `2^s` of a large one would overflow; it cancels.
         let largest = scores.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let weights: Vec<f32> = scores.iter().map(|s| (s - largest).exp2()).collect();
         let sum: f32 = weights.iter().sum();

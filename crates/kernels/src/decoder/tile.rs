@@ -8,10 +8,11 @@ use crate::math::exp2_lanes;
 use lanes::DenseLanes;
 use lanes::{Isa, by_isa};
 
-/// Nodes of the largest tile.
+/// Nodes of the largest tile: the stack arrays of a tile are as long on every machine.
 pub(super) const MAX_NODES: usize = 64;
 
-/// Nodes of a tile.
+/// Nodes of a tile: as many as the register tile of the set has lanes ([`body`]). The arrays of a
+/// tile are meant to stay in the second-level cache through all layers.
 pub(super) fn nodes(isa: Isa) -> usize {
     match isa {
         Isa::Avx512 => 48,
@@ -160,6 +161,8 @@ unsafe fn layers<V: DenseLanes, const R: usize, const C: usize>(
 
 /// `to[k][i] = table[rows[i]][column + k]` for `k < count`.
 #[inline(always)]
+/// Rows of the table are nodes and become lanes: blocks of `V::COUNT` by `V::COUNT` are turned in
+/// registers, what is left of a row number by number.
 pub(super) unsafe fn gather<V: DenseLanes>(
     table: &[f32],
     rows: &[usize],
@@ -192,6 +195,8 @@ pub(super) unsafe fn gather<V: DenseLanes>(
 
 /// `s = 2^(s - max s)` over the tokens of each node, and one over the sum to `scale`.
 #[inline(always)]
+/// Nodes keep unscaled weights in `scores`; the scale is applied to the product with the values,
+/// which has fewer rows than there are tokens. Sums are in chains as in [`super::gemm`].
 pub(super) unsafe fn exponentials<V: DenseLanes, const C: usize>(
     scores: *mut f32,
     tokens: usize,
@@ -230,6 +235,8 @@ pub(super) unsafe fn exponentials<V: DenseLanes, const C: usize>(
 
 /// `y = (x - mean x) / sqrt(var x + eps)` over the features of each node.
 #[inline(always)]
+/// Two passes: the variance of what is left after the mean does not cancel, as the difference of
+/// the mean square and the squared mean would.
 pub(super) unsafe fn normalise<V: DenseLanes, const C: usize>(
     x: *const f32,
     h: usize,
@@ -286,6 +293,7 @@ pub(super) unsafe fn normalise<V: DenseLanes, const C: usize>(
 
 /// `out [3][nodes] = W_3 x + b_3`.
 #[inline(always)]
+/// Only three of the group's eight outputs exist; [`multiply`] would compute all.
 pub(super) unsafe fn head<V: DenseLanes, const C: usize>(
     decoder: &PackedDecoder,
     x: *const f32,

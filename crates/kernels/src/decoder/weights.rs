@@ -37,6 +37,7 @@ pub struct DecoderWeights<'a> {
 /// `W x + b` ready for the micro-kernel.
 #[derive(Debug, Default, HeldBytes)]
 pub(super) struct Linear {
+    /// Inputs, `in`.
     pub depth: usize,
     /// `[out,in]`, for the scalar reference.
     pub plain: Vec<f32>,
@@ -53,8 +54,11 @@ pub(super) struct Linear {
 /// A matrix in bf16, in both layouts.
 #[derive(Clone, Copy)]
 pub(super) struct Narrow<'a> {
+    /// Rows that exist, padded to a multiple of eight.
     pub outputs: usize,
+    /// As of [`Linear::pairs`].
     pub pairs: &'a [bf16],
+    /// As of [`Linear::blocks`].
     pub blocks: &'a [bf16],
 }
 
@@ -68,6 +72,8 @@ impl Linear {
         }
     }
 
+    /// Packs `weight [out,in]` in each layout that this machine can run. All of them stay, since a
+    /// scene chooses its precision later and a model is shared by scenes.
     fn new(
         outputs: usize,
         depth: usize,
@@ -99,6 +105,8 @@ impl Linear {
     }
 
     /// `W LN(y) + b` where `LN` has a scale and a shift, as a layer on the plain normalised `y`.
+    /// `W (g * y + s) + b = (W diag g) y + (W s + b)`. The new bias is summed in f64: it is made
+    /// once.
     fn after_norm(
         outputs: usize,
         depth: usize,
@@ -123,17 +131,25 @@ impl Linear {
 
 const WHAT: &str = "the decoder's weights";
 
+/// A weight and a bias, or a norm's scale and shift.
 type Tensors<'a> = (&'a [f32], &'a [f32]);
 
 /// The decoder of a model, packed. Immutable; shared by scenes and threads.
 #[derive(Debug, HeldBytes)]
 pub struct PackedDecoder {
+    /// `h`, the width of the residual stream.
     pub(super) hidden: usize,
+    /// Attention heads of `h / heads` features.
     pub(super) heads: usize,
+    /// `m`, the width of the hidden layer.
     pub(super) mlp: usize,
+    /// `W_o`, `b_o`: `[h,h]`.
     pub(super) attention_out: Linear,
+    /// `W_1`, `b_1` with LN_2 folded in: `[m,h]`.
     pub(super) mlp1: Linear,
+    /// `W_2`, `b_2`: `[h,m]`.
     pub(super) mlp2: Linear,
+    /// `W_3`, `b_3` with LN_3 folded in: `[3,h]`.
     pub(super) head: Linear,
 }
 
@@ -193,14 +209,18 @@ impl PackedDecoder {
     }
 }
 
+/// What there is no memory for, where there is none.
 const TOKENS: &str = "the decoder's tokens";
 
 /// One step's keys and values, packed. Made once ([`DecoderTokens::new`]), filled each step
 /// without allocation ([`DecoderTokens::set`]).
 #[derive(Debug, HeldBytes)]
 pub struct DecoderTokens {
+    /// `L`.
     tokens: usize,
+    /// `h` of the model that they were made for.
     hidden: usize,
+    /// Attention heads.
     heads: usize,
     /// Scaled keys `[L,h]`, for the scalar reference.
     pub(super) keys: Vec<f32>,
@@ -214,10 +234,16 @@ pub struct DecoderTokens {
 /// A matrix `[outputs, depth]` of each head, packed as those of a layer are ([`Linear`]); a head after another.
 #[derive(Debug, HeldBytes)]
 struct Heads {
+    /// Rows of a head's matrix.
     outputs: usize,
+    /// Columns of it.
     depth: usize,
+    /// Always filled: the f32 kernels and the fallback read them.
     panels: Vec<f32>,
+    /// Filled by a step whose scene multiplies bf16 on vectors; zeros or an earlier step's
+    /// otherwise.
     pairs: Vec<bf16>,
+    /// The same for matrix tiles.
     blocks: Vec<bf16>,
 }
 
@@ -305,6 +331,7 @@ impl DecoderTokens {
     ///
     /// # Panics
     /// If they have another length.
+    /// `log2 e` goes into the keys because `e^s = 2^(s log2 e)` and the kernels have `2^x`.
     pub fn set(&mut self, precision: DecoderPrecision, keys: &[f32], values: &[f32]) {
         let (h, tokens, width) = (self.hidden, self.tokens, self.hidden / self.heads);
         assert_eq!(keys.len(), tokens * h, "keys must be [L, h]");

@@ -15,6 +15,7 @@ const GAIN: f32 = 0.95;
 /// What has been measured.
 #[derive(Default)]
 pub struct Turns {
+    /// Questions so far: every [`PROBE`]th goes the other way.
     count: u32,
     /// Seconds with workers, and without them; how many there have been.
     times: [[f32; REMEMBERED]; 2],
@@ -41,6 +42,7 @@ impl Turns {
     }
 }
 
+/// A median, so that one time during which others kept the core busy does not move it.
 fn median(mut times: [f32; REMEMBERED]) -> f32 {
     times.sort_unstable_by(f32::total_cmp);
     times[REMEMBERED / 2]

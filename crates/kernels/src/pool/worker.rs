@@ -1,4 +1,8 @@
 //! What the threads of a pool share, and what a worker does: it sleeps, or looks for a while, until there is a job, and takes chunks of it.
+//!
+//! The lock of [`State`] orders everything: a job is published and withdrawn under it, and a worker
+//! enters and leaves under it. The atomics beside it only spare those that look the lock. Between
+//! two jobs `job` is none and `active` is 0, so no task is reachable.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -6,7 +10,8 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use lanes::{FlushToZero, Isa};
 
-/// Looks of a worker that is kept awake for the next job, and of a caller for the end of one, before it sleeps: about 0.1 ms.
+/// Looks of a worker that is kept awake for the next job, and of a caller for the end of one,
+/// before it sleeps: about 0.1 ms, so that a host that stops calling gets its cores back at once.
 pub const LOOKS: u32 = 2000;
 
 /// What runs a chunk: `(chunk, worker)`, `worker < threads()` names the scratch space that this
@@ -16,16 +21,20 @@ pub type Task<'a> = dyn Fn(usize, usize) + Sync + 'a;
 /// A job's address as the workers see it; valid while `run` has it published.
 #[derive(Clone, Copy)]
 pub struct Job {
+    /// Borrowed from the caller of `run`, with its lifetime erased.
     pub task: *const Task<'static>,
+    /// Chunks are `0..chunk_count`.
     pub chunk_count: usize,
 }
 // SAFETY: the task is `Sync` and outlives the job (see `super::Pool::run`).
 unsafe impl Send for Job {}
 
 pub struct State {
+    /// Published by `run`, and taken back by it once the counter has run out.
     pub job: Option<Job>,
     /// Number of the job, counted up by each.
     pub epoch: u64,
+    /// Workers inside a job. `run` returns only at 0.
     pub active: usize,
     /// The pool is dropped: workers end.
     pub closing: bool,
@@ -34,8 +43,11 @@ pub struct State {
 }
 
 pub struct Shared {
+    /// Everything that needs an order.
     pub state: Mutex<State>,
+    /// A job was published, or the pool is closing.
     pub wake: Condvar,
+    /// `active` has fallen to 0.
     pub done: Condvar,
     /// The chunk that is taken next; beyond the job's count where none is left.
     pub next: AtomicUsize,
@@ -49,6 +61,7 @@ pub struct Shared {
 }
 
 impl Shared {
+    /// No job, nobody awake.
     pub fn new() -> Shared {
         Shared {
             state: Mutex::new(State {
@@ -68,11 +81,13 @@ impl Shared {
         }
     }
 
+    /// Relaxed: it decides only how somebody waits, never what is computed.
     pub fn is_awake(&self) -> bool {
         self.awake.load(Ordering::Relaxed) > 0
     }
 
     /// Looks, for a while, until `found`.
+    /// It returns at the latest after [`LOOKS`] turns; the caller asks again under the lock.
     pub fn look(&self, found: impl Fn() -> bool) {
         for _ in 0..LOOKS {
             if found() || !self.is_awake() {
@@ -82,6 +97,7 @@ impl Shared {
         }
     }
 
+    /// A poisoned lock is taken as it is: no panic happens while the state is half changed.
     pub fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -105,6 +121,8 @@ impl Shared {
     }
 }
 
+/// The life of a worker: sleep until there is a job that it has not seen, work, leave, and look
+/// once for the next before it sleeps again, where somebody keeps the pool awake.
 pub fn worker_loop(shared: &Shared, isa: Isa, worker: usize) {
     let _mode = FlushToZero::of(isa);
     let (mut seen, mut looked) = (0, false);
@@ -147,6 +165,7 @@ pub fn worker_loop(shared: &Shared, isa: Isa, worker: usize) {
     }
 }
 
+/// The text of a panic, of which `panic!` makes one of two types.
 pub fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
     payload
         .downcast_ref::<&str>()

@@ -1,4 +1,7 @@
 //! Inner products of table rows with vectors that are zero outside of some ranges.
+//!
+//! A force at a few nodes excites the coordinates of their blocks alone, and a vector that is zero
+//! elsewhere needs no other columns of the table: what is skipped would only have added zeros.
 
 use std::ops::Range;
 

@@ -27,6 +27,7 @@ impl RowPlan {
         self.places.clear();
         memory::fit(&mut self.places, rows, WHAT)?;
         self.places.resize(rows, [0; 2]);
+        // Each block ends a run, and each full run begins another.
         let blocks = basis.block_offsets.len() - 1;
         memory::fit(&mut self.runs, blocks + rows / RUN_NODES, WHAT)?;
         for k in 0..blocks {
