@@ -3,6 +3,9 @@
 //! Whole it grows with the square of the domain: 15 MB for 639 contact nodes, 221 MB for 2,476. Compressed it is stored for
 //! neighbours only; what lies farther apart is smooth and comes out of the linear response itself, `A_ij = U_i response[j]` with
 //! the rows `U_i` of node `i` in the bases of its block (low rank).
+//!
+//! Why neighbours are exact: bases of low rank show what is smooth, and the dent right below a
+//! force is the sharpest that there is.
 
 use super::numbers::Numbers;
 use super::response_table::Response;
@@ -55,6 +58,7 @@ pub struct Bases<'a> {
 }
 
 /// `a . b`, in so many sums at once that no processor waits for one.
+/// Eight sums in a fixed order: the bits do not depend on what the compiler makes of them.
 fn dot(a: &[f32], b: &[f32]) -> f32 {
     const LANES: usize = 8;
     let (wide_a, rest_a) = a.as_chunks::<LANES>();
@@ -133,6 +137,7 @@ impl Compliance {
     }
 
     /// As [`Compliance::gather`], with columns behind the table's own.
+    /// A borrowed column is known by its source's response and by its own node's rows of the basis.
     pub fn gather_borrowed<T: From<f32>>(
         &self,
         bases: Bases<'_>,
@@ -157,6 +162,7 @@ impl Compliance {
                     continue;
                 }
                 let (row, across) = (source(column), source(other));
+                // A whole table has no rows of a copy; its source's are taken for both.
                 let block = match self {
                     Compliance::Whole(whole) => std::array::from_fn(|at| {
                         whole[(3 * row + at / 3) * 3 * own + 3 * across + at % 3]

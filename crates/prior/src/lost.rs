@@ -1,4 +1,8 @@
 //! What elements of a body have lost to cuts, as the tables on the modes take it.
+//!
+//! A cut takes elements away, or parts of them, so the stiffness and mass on the modes change by
+//! `Phi^T dK Phi` and `Phi^T dM Phi`. Only the corners of such elements have a part in these
+//! products: the modes are read there once, and each product is a sum over elements.
 
 use field::error::Result;
 use field::memory;
@@ -9,7 +13,9 @@ const WHAT: &str = "what a cut body has lost";
 pub struct Lost {
     /// Its number in the intact mesh.
     pub element: u32,
+    /// Nodes of the intact mesh, in the order of its element list.
     pub corners: [u32; 4],
+    /// By corner: false where the node is held, and so neither moves nor has rows.
     pub is_free: [bool; 4],
     /// Of its stiffness over the material's, times the rest volume, mm³.
     pub volume: f64,
@@ -23,6 +29,7 @@ pub struct Lost {
 
 /// All of them, with the modes at their free corners.
 pub struct LostElements {
+    /// In any order; sums over it are made in this one.
     pub list: Vec<Lost>,
     /// Free corners, ascending.
     pub nodes: Vec<u32>,
@@ -48,6 +55,7 @@ impl LostElements {
         count: usize,
         values: impl Fn(u32, usize) -> I,
     ) -> Result<(Vec<f32>, Vec<f32>)> {
+        // Held corners are in no list and add nothing: their displacement is zero.
         let mut forces = memory::zeros(3 * self.nodes.len() * count, WHAT)?;
         let mut masses = memory::zeros(self.nodes.len(), WHAT)?;
         for own in &self.list {

@@ -18,6 +18,7 @@ pub enum Numbers {
 }
 
 impl Numbers {
+    /// A tensor of either type, checked against `shape`; `None` in it stands for any length.
     pub(super) fn read(
         file: &TensorFile,
         tensor: &str,
@@ -31,6 +32,7 @@ impl Numbers {
     }
 
     /// Half-precision numbers as they are, or widened once where no instruction widens them in each step.
+    /// WebAssembly has none: widening in each step took 16 % of it (docs/decisions/025-web.md).
     pub(super) fn of_f16(half: Vec<f16>) -> Result<Numbers> {
         if cfg!(target_family = "wasm") {
             let wide = half.iter().map(|x| x.to_f32());
@@ -69,7 +71,8 @@ impl Numbers {
     }
 }
 
-/// What a file leaves out is memory all the same: a small file asks for no more than so many times its size.
+/// What a file leaves out is memory all the same: a small file asks for no more than so many times
+/// its size. It bounds what a damaged or hostile file can make a host allocate.
 const MOST_ZEROS: usize = 64;
 
 /// The numbers of a whole table, where a file that holds `stored` of its bytes or numbers may ask for so many; `leaves` says which of them are left out.

@@ -18,6 +18,8 @@ impl ContactResponse {
         places: &[u32],
         out: &mut [f32],
     ) {
+        // `imposed` is zero between calls: it is filled here, read, and zeroed again below for the
+        // columns that were used. A walk over the whole table would cost more than the contact.
         out.fill(0.0);
         for &node in nodes {
             if let Some((slot, own)) = table.column_for(held, node) {
@@ -25,6 +27,7 @@ impl ContactResponse {
                 self.imposed.own[slot] |= own;
             }
         }
+        // In a second pass, since a share is known only once all borrowers have been counted.
         for (&node, &place) in nodes.iter().zip(places) {
             let Some((slot, own)) = table.column_for(held, node) else {
                 continue;

@@ -1,5 +1,10 @@
 //! The learned map of a release (`release.safetensors` of `docs/reference/formats.md`): `b' = [b, b_before] W` for what the natural
 //! modes leave out of a released field. Linear, and it dies away.
+//!
+//! A body that is let go has been pressed into a shape that its natural modes alone cannot show.
+//! What remains is taken as coordinates `b` of a few further modes, and the map carries them from
+//! step to step beside the oscillators ([`super::vibration`]). That the spectral radius is below
+//! one is checked when the file is read: no release can grow, whatever the file was trained on.
 
 use bundle::TensorFile;
 use field::error::Result;
@@ -7,7 +12,8 @@ use field::memory::{self, HeldBytes};
 
 /// Most modes that a file may hold.
 const LIMIT: usize = 128;
-/// After `2^SQUARINGS` steps every state is smaller than it was.
+/// After `2^SQUARINGS` steps every state is smaller than it was: 64 steps, which is six products of
+/// small matrices to check.
 const SQUARINGS: usize = 6;
 
 /// Modes and their step.
@@ -17,6 +23,7 @@ pub struct Release {
     pub modes: Vec<f32>,
     /// `W [2r,r]`: from `b` and the `b` before it to the next.
     step: Vec<f32>,
+    /// `r`.
     pub count: usize,
 }
 
@@ -52,6 +59,8 @@ impl Release {
 }
 
 /// Whether the power `2^SQUARINGS` of `[b, b_before] -> [b', b]` is smaller than 1 in the Frobenius norm.
+/// That norm bounds the spectral one, so the map's spectral radius is below 1 then. A NaN fails the
+/// comparison and is refused with the rest.
 fn dies_away(step: &[f32], count: usize) -> Result<bool> {
     const WHAT: &str = "the map of a release";
     let size = 2 * count;

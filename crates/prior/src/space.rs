@@ -4,6 +4,9 @@
 //! With `kappa = 9/(4h²) + 3 alpha/(2h)` of BDF2, `K + kappa M` takes the place of the stiffness everywhere. Its compliance at the
 //! contact is the static one less what inertia holds back, `A_k = A - N diag(kappa / (w² (w² + kappa))) N^T` with
 //! natural modes `N` of frequency `w`.
+//!
+//! The preconditioner solves on these modes exactly. Nothing here depends on the state: `K` and `M`
+//! are those of the body at rest, so the tables are made once, and scenes share them.
 
 mod cut;
 
@@ -19,7 +22,7 @@ use kernels::contact::ContactFactor;
 use kernels::rows::Stored;
 
 const WHAT: &str = "the modes of the corrections";
-/// Most modes that a file may hold.
+/// Most modes that a file may hold: the Galerkin matrix is dense, `[r,r]`, and is factored.
 const LIMIT: usize = 1024;
 
 /// The modes and what the elements and the mass make of them.
@@ -55,6 +58,7 @@ type Inverses = Vec<(u64, Vec<f32>)>;
 
 impl CoarseSpace {
     /// Reads and checks the tables for a prior.
+    /// Their diagonals must be positive; whether `K + kappa M` has a factor shows when one is made.
     pub fn parse(file: &TensorFile, prior: &PriorTable, isa: Isa) -> Result<CoarseSpace> {
         let modes = file.f16("modes", &[None, Some(prior.width())])?;
         let count = modes.len() / prior.width().max(1);
@@ -156,6 +160,7 @@ impl CoarseSpace {
     ///
     /// # Errors
     /// [`field::Error::OutOfMemory`].
+    /// Natural modes are orthogonal in `M`, so the diagonal of its product is the mass of each.
     pub fn natural(&self) -> Result<Vec<(f32, f32)>> {
         let count = self.count();
         let frequencies = self.frequency.iter().enumerate();
@@ -172,6 +177,7 @@ impl CoarseSpace {
     }
 
     /// The same, mode by mode.
+    /// The factor 1e3 turns mm/µN, in which the mass is g and time s, into mm/mN.
     pub fn holds_back(&self, kappa: f64) -> impl Iterator<Item = f32> {
         let count = self.count();
         let frequencies = self.frequency.iter().enumerate();
@@ -205,6 +211,8 @@ impl CoarseSpace {
             return self.inverse(kappa, isa);
         }
         let mut kept = self.inverses.lock().unwrap_or_else(PoisonError::into_inner);
+        // By bits: the same step gives the same kappa, and no comparison with a tolerance could
+        // give another scene's inverse.
         if let Some((_, known)) = kept.iter().find(|own| own.0 == kappa.to_bits()) {
             return memory::copied(known, WHAT);
         }

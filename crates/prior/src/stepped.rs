@@ -13,10 +13,10 @@ use field::memory;
 
 const WHAT: &str = "the linear response";
 
-/// Coordinates of a group.
+/// Coordinates of a group: ranks are multiples of eight, as the kernels' registers want them.
 const GROUP: usize = 8;
 
-/// Bits of a code, by the two bits that say so.
+/// Bits of a code, by the two bits that say so. Zero is the common case far from a node.
 const BITS: [usize; 4] = [0, 4, 8, 16];
 
 /// The largest step: with it the largest code is the largest float16.
@@ -35,6 +35,7 @@ pub(super) fn response(
     rank_offsets: &[usize],
 ) -> Result<Response> {
     let width = *rank_offsets.last().unwrap_or(&0);
+    // Four groups to a byte of widths; a node's last byte may be part empty.
     let (groups, stride) = (width / GROUP, (width / GROUP).div_ceil(4));
     let shape = [Some(columns), Some(stride)];
     let widths = file.raw("response_widths", Dtype::U8, &shape)?;
@@ -45,6 +46,7 @@ pub(super) fn response(
     let total = (0..columns).flat_map(of_node).sum();
     let mut codes = file.raw("response", Dtype::U8, &[Some(total)])?;
     let size = (3 * columns).checked_mul(width);
+    // Before any room is made: widths of zero cost a file nothing.
     fits(file, "response_widths", size, widths.len() + total)?;
 
     let blocks = rank_offsets.len() - 1;
@@ -102,6 +104,7 @@ pub(super) fn basis(
     let groups = rank_offsets.last().map_or(0, |width| width / GROUP);
     let widths = file.raw("basis_widths", Dtype::U8, &[Some(groups.div_ceil(4))])?;
     let steps = steps(file, "basis_step", groups)?;
+    // Of each block its rows, three a node, and its range of coordinates.
     let blocks = || {
         let nodes = block_offsets.windows(2).map(|pair| pair[1] - pair[0]);
         let ranks = rank_offsets.windows(2);
@@ -133,6 +136,8 @@ pub(super) fn basis(
 }
 
 /// Steps, of which each must be one.
+/// A step of zero, below zero or NaN would make every code zero or nonsense; one that is too large
+/// would overflow float16, in which the table is kept.
 fn steps(file: &TensorFile, tensor: &str, count: usize) -> Result<Vec<f32>> {
     let steps = file.f32(tensor, &[Some(count)])?;
     match steps

@@ -105,6 +105,7 @@ impl PriorTable {
     }
 
     /// The same without the blocks of two columns that are both `known`, which stay as they are.
+    /// Contacts grow node by node: of a set that has grown only the new rows are read.
     pub fn gather_new_compliance<T: From<f32>>(
         &self,
         columns: (&[u32], &[bool]),

@@ -5,6 +5,11 @@
 //!
 //! A corrected state is more than its modes. What they leave out, `b = Phi (q - sum_k z_k modes[k])`, a learned linear map may carry on
 //! (`release.safetensors`).
+//!
+//! With `r = sqrt(w^2 - (alpha/2)^2)` an oscillator of frequency `w` goes over a step `h` as
+//! `z' = e^(-alpha h/2) (cos(r h) + alpha/2 sin(r h)/r) z + e^(-alpha h/2) sin(r h)/r v`; there is
+//! no error of integration and no limit on the step. Velocities are kept times the step, mm, so
+//! that amplitudes and velocities have one unit.
 
 use super::release::Release;
 use bundle::TensorFile;
@@ -15,7 +20,7 @@ use kernels::respond::accumulate_rows;
 use kernels::rows::Stored;
 use kernels::{Isa, Pool};
 
-/// Most modes that a file may hold.
+/// Most modes that a file may hold: each costs a row of the table in every step without contact.
 const LIMIT: usize = 4096;
 
 /// Modes and their exact step.
@@ -100,6 +105,8 @@ impl FreeVibration {
     }
 
     /// One step without contact.
+    /// `state` and `next` have [`FreeVibration::state_len`] numbers; they are two arrays, since the
+    /// state before stays readable until the step is published.
     pub fn advance(&self, state: &[f32], next: &mut [f32]) {
         let count = self.count();
         let (state, b) = state.split_at(2 * count);
@@ -130,6 +137,7 @@ impl FreeVibration {
 
     /// Sets `b` (`before`: the one before it) of a state from what its amplitudes `z` leave out of a field in block coordinates, which
     /// they are taken from.
+    /// On return `q` holds the remainder itself. Without a learned map nothing is done.
     pub fn set_remainder(
         &self,
         isa: Isa,
@@ -161,12 +169,14 @@ impl FreeVibration {
 }
 
 /// The exact step of `z'' + damping z' + omega^2 z = 0`, velocities times `dt`.
+/// `[A, B, C, D]` of `z' = A z + B w`, `w' = C z + D w` with `w = dt z'`. In f64, once a model.
 pub fn propagator(omega: f64, damping: f64, dt: f64) -> [f32; 4] {
     let half = 0.5 * damping;
     let squared = omega * omega - half * half;
     let root = squared.abs().sqrt();
     let decay = libm::exp(-half * dt);
     // sin(r t) / r and cos(r t), with r imaginary where the mode is overdamped.
+    // Near critical damping both forms divide by almost nothing; their limit is `t`.
     let (sine, cosine) = if root * dt < 1e-6 {
         (dt, 1.0)
     } else if squared > 0.0 {

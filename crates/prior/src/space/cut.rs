@@ -1,4 +1,8 @@
 //! The modes of a body that has been cut: the intact body's, at its own nodes and copies, and what elements have lost taken off the products with them.
+//!
+//! The space does not grow with a cut. The modes `Phi` stay those of the intact body, a copy of a
+//! node moves in them as its parent does, and `Phi^T K Phi` loses what the cut elements had. That
+//! new lips can part is nothing that these modes know; the iterations find it.
 
 use std::sync::Arc;
 
@@ -19,6 +23,8 @@ impl CoarseSpace {
         let free = corners.filter(|(_, is_free)| *is_free);
         let mut nodes = memory::collected(4 * list.len(), free.map(|(node, _)| node), WHAT)?;
         nodes.sort_unstable();
+        // Sorted and each once: [`LostElements::at`] searches by halving, and sums run in this
+        // order.
         nodes.dedup();
         let modes = self.count();
         let mut rows = memory::zeros(3 * nodes.len() * modes, WHAT)?;
@@ -61,6 +67,8 @@ impl CoarseSpace {
             isa: self.isa,
         };
         space.take_off(lost)?;
+        // Nodes that a cut lays bare have no rows in the file. Those of a contact node are copied
+        // from its parent's, others are read off the modes.
         let added = &prior.contact_nodes[intact.contact_nodes.len()..];
         space.at_added = memory::zeros(3 * added.len() * count, WHAT)?;
         let mut q = memory::zeros(prior.width(), WHAT)?;
@@ -112,6 +120,8 @@ impl CoarseSpace {
 
     /// The modes at a node `[3,r]`; `q [Q]` is room, and zero.
     fn read_node(&self, prior: &PriorTable, node: u32, q: &mut [f32], rows: &mut [f32]) {
+        // A node's rows of the basis reach the coordinates of its block alone, so nothing else of
+        // the modes is read.
         let range = prior.coordinates_of(node);
         let modes = self.modes();
         for (axis, row) in rows.chunks_exact_mut(self.count().max(1)).enumerate() {

@@ -1,4 +1,8 @@
 //! The block-wise basis: each node is of one block, and each block has modes of its own.
+//!
+//! Neighbouring nodes move alike, so the fields of a block of them lie near a space of far fewer
+//! dimensions than it has degrees of freedom. `u_k = U_k q_k` with `U_k [3 n_k,r_k]`,
+//! `U_k^T U_k = 1`; blocks share no node and no coordinate, so each can be decoded on its own.
 
 use std::sync::Arc;
 
@@ -22,6 +26,7 @@ pub(super) struct Blocks {
     #[held(own)]
     pub numbers: Arc<Numbers>,
     /// By node: where its rows start, where its block's coordinates start, and how many.
+    /// In numbers, not bytes: `u32` reaches 16 GB of f32.
     pub places: Vec<(u32, u32, u32)>,
 }
 
@@ -38,6 +43,7 @@ impl Blocks {
     }
 
     /// Row `axis` of a node in the basis times coordinates `q`.
+    /// `q` is asked for the coordinates of the node's block alone.
     pub fn value_at(&self, node: u32, axis: usize, q: impl Fn(usize) -> f32) -> f32 {
         let (row, start, rank) = self.places[node as usize];
         let row = row as usize + axis * rank as usize;

@@ -19,6 +19,8 @@ impl PriorTable {
     ///
     /// # Errors
     /// [`field::Error::OutOfMemory`].
+    /// `mesh` has the nodes of this table's mesh first and the copies behind them, one for each of
+    /// `parents`, in the order in which they were made.
     pub fn cut(&self, mesh: &Mesh, parents: &[u32]) -> Result<PriorTable> {
         let (count, blocks) = (mesh.node_count(), &self.blocks);
         let own = count - parents.len();
@@ -41,6 +43,7 @@ impl PriorTable {
         let mut left = copies.as_slice();
         let (mut first_row, mut places) = (0, memory::room(count, WHAT)?);
         places.extend_from_slice(&blocks.places);
+        // Every copy's place is set below: each belongs to the block of its parent.
         places.resize(count, (0, 0, 0));
         let ranges = (blocks.offsets)
             .windows(2)
@@ -52,6 +55,8 @@ impl PriorTable {
             let (start, rank) = (ranks[0], ranks[1] - ranks[0]);
             let is_here = |copy: &&(u32, u32)| block(copy) == (start, rank);
             let here = left.iter().take_while(is_here).count();
+            // The parent's rows, by its place in the block: where they start, over three rows'
+            // length.
             for &(parent, copy) in &left[..here] {
                 let place = blocks.places[parent as usize];
                 block_nodes.push(copy);
@@ -79,6 +84,8 @@ impl PriorTable {
         let mut in_domain = memory::filled(count, false, WHAT)?;
         for &node in &mesh.domain_nodes {
             in_domain[node as usize] = true;
+            // A copy, or a node inside the body that a cut has laid bare: the nearest column of its
+            // parent is the nearest of its own, as both rest at one place.
             let near = self.nearest_column[parent(node) as usize];
             if near != NO_COLUMN && self.contact_nodes[near as usize] != node {
                 nearest_column[node as usize] = contact_nodes.len() as u32;

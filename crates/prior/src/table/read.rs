@@ -1,4 +1,8 @@
 //! `prior.safetensors`, read and checked.
+//!
+//! Every length, index and order is checked here and nowhere else: kernels and solves index these
+//! tables in each step without looking. A fault is an error that names the file, the tensor and the
+//! element; no panic and no allocation out of proportion comes of a damaged file.
 
 use std::sync::Arc;
 
@@ -17,14 +21,22 @@ use field::grid::{PointGrid, squared_distance};
 use field::memory;
 
 const WHAT: &str = "the linear response";
-/// How far outside the domain a contact node borrows a column, in typical edges of the domain.
+/// How far outside the domain a contact node borrows a column, in typical edges of the domain. A
+/// collision field may reach a few nodes beyond it; what is farther is answered by nothing, and the
+/// step reports it ([`super::super::SolveReport`]).
 const REACH: f64 = 4.0;
 
 impl PriorTable {
     /// Reads and checks the tables that the manifest's entry names.
+    ///
+    /// # Errors
+    /// [`field::Error::Bundle`] of what does not fit the manifest, the mesh or another table,
+    /// [`field::Error::OutOfMemory`].
     pub fn open(files: &BundleFiles, entry: &PriorEntry, mesh: &Mesh) -> Result<PriorTable> {
         let manifest = &files.manifest;
         let tables = files.tensors(&entry.file)?;
+        // The residual modes may have a file of their own: a body without a predictor leaves them
+        // out.
         let learned = (entry.residual.as_ref()).map(|name| files.tensors(name));
         let learned = learned.transpose()?;
         let learned = learned.as_ref().unwrap_or(&tables);
@@ -96,6 +108,7 @@ impl PriorTable {
                 format!("rank of block {at} is not a multiple of 8"),
             ));
         }
+        // `Q`, and the numbers of all blocks' bases together.
         let width = *rank_offsets.last().unwrap_or(&0);
         let size: usize = block_offsets
             .windows(2)
@@ -107,6 +120,7 @@ impl PriorTable {
         let compliance = Compliance::read(file, contact_nodes.len(), |i| {
             places[contact_nodes[i] as usize]
         })?;
+        // Empty where the manifest names no modes: a bundle without a learned map has none.
         let optional = |name: &str, shape: [usize; 2]| {
             if shape[1] > 0 {
                 learned.float(name, &[Some(shape[0]), Some(shape[1])])
@@ -226,6 +240,7 @@ fn nearest_columns(mesh: &Mesh, contact_nodes: &[u32]) -> Result<Vec<u32>> {
         .iter()
         .map(|&node| mesh.node_area[node as usize] as f64)
         .sum();
+    // The side of a square of a contact node's mean area.
     let edge = (area / contact_nodes.len() as f64).sqrt();
     let columns = (0..mesh.node_count() as u32).map(|node| {
         let p = mesh.position(node);
