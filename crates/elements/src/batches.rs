@@ -1,4 +1,9 @@
 //! Clusters packed into batches of 16, with the constants of their tetrahedra.
+//!
+//! Structure of arrays: the lane is the fastest index of each constant, so that a register loads
+//! the same constant of neighbouring clusters. The constants are made in f64 from the rest shape
+//! and rounded once. A batch is full but for the last of its chunk; lanes without a cluster repeat
+//! the shape of another and have no stiffness, so that they give no force and no small det F.
 
 use crate::cluster::{Cluster, Group, corners};
 use crate::directions::Directions;
@@ -17,6 +22,7 @@ pub const PADDING: u32 = u32::MAX;
 /// Batches of one kind of cluster.
 #[derive(Default)]
 pub struct Kind<const NODES: usize, const TETS: usize> {
+    /// Constants and slots, a batch after another.
     pub batches: Vec<Cluster<NODES, TETS>>,
     /// A row a batch where a law of the body takes displacements or the material relaxes, else none.
     pub gradients: Vec<Gradients<TETS>>,
@@ -104,6 +110,8 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                         directions.set((tet, lane), gradient, own, volume.abs() * stiffness);
                     }
                     // The order of the corners in a group may turn the element around.
+                    // With the sign of a force on the node, so that the kernel adds without
+                    // negating.
                     let factor = -source.material.shear_pa() * volume.abs() * stiffness;
                     for (row, [j, k]) in batch.springs[tet].iter_mut().zip(PAIRS) {
                         row[lane] = (factor * dot(gradient[j], gradient[k])) as f32;
@@ -248,6 +256,7 @@ fn disjoint_batches<const NODES: usize, const TETS: usize>(
         let most = all.len() + WIDTH;
         used.clear();
         remaining.retain(|group| {
+            // Taken in order: earlier groups, which are neighbours, go first where they can.
             if all.len() == most || group.nodes.iter().any(|n| used.contains(n)) {
                 return true;
             }

@@ -1,4 +1,9 @@
 //! Recursive coordinate bisection of elements into compact parts.
+//!
+//! Along the longest extent of a part, at the element that splits it in proportion to the leaves on
+//! either side (Berger and Bokhari, A partitioning strategy for nonuniform problems on
+//! multiprocessors, IEEE Trans. Comput. C-36, 1987). Ties are broken by number: the order is the
+//! same on every machine.
 
 /// Splits `order` into `count` spatially compact leaves of nearly equal size, one after another; `sizes` has room for theirs.
 pub fn bisect(order: &mut [u32], centroids: &[[f32; 3]], count: usize, sizes: &mut Vec<usize>) {

@@ -33,9 +33,13 @@ pub struct CutTetrahedra<'a> {
 
 /// An element of a new chunk.
 struct Packed {
+    /// In the intact body, or `T + i` of the `i`-th cell.
     number: u32,
+    /// Nodes of the cut body.
     corners: [u32; 4],
+    /// Over the material's.
     stiffness: f32,
+    /// At rest, of the element that it is or was a part of.
     fibre: [f32; 3],
 }
 
@@ -44,6 +48,8 @@ impl ElementForces {
     ///
     /// # Errors
     /// No memory.
+    /// This body stays as it is. The large arrays of constants are copied, and only batches with a
+    /// changed element are written to.
     pub fn cut(
         &self,
         cut: CutTetrahedra<'_>,
@@ -74,6 +80,8 @@ impl ElementForces {
             octahedra.take_out(&mut chunk.octahedra, &is_changed, &mut out)?;
             pairs.take_out(&mut chunk.pairs, &is_changed, &mut out)?;
             singles.take_out(&mut chunk.singles, &is_changed, &mut out)?;
+            // Clusters are taken out batch by batch; the new chunks are packed in the order of the
+            // mesh.
             out.sort_unstable();
             let mut own = Vec::new();
             for &number in &out {
@@ -109,6 +117,8 @@ impl ElementForces {
                 push(&mut parents, at as u32)?;
             }
         }
+        // New chunks may own copies of nodes and share others as ghosts; owners in the old chunks
+        // get further contributions.
         partition.connect_from(base)?;
         partition.fit_zeros()?;
         Ok(self.with(partition, parents, cut.positions.len()))
@@ -117,6 +127,7 @@ impl ElementForces {
 
 impl Partition {
     /// A copy, for a body of so many nodes.
+    /// With room for some chunks more. Nodes beyond the old body's have no slot yet.
     fn copied(&self, nodes: usize) -> Result<Partition, TryReserveError> {
         let mut chunks = room(self.chunks.len() + 8)?;
         for chunk in &self.chunks {
@@ -155,6 +166,8 @@ impl Partition {
         let stiffness = collected(elements.iter().map(|element| element.stiffness))?;
         let fibre = collected(elements.iter().map(|element| element.fibre))?;
         let leaf = collected(0..elements.len() as u32)?;
+        // Copies of nodes, or nodes inside the body before: the first new chunk that has them owns
+        // them.
         let mut fresh = room(4 * tets.len())?;
         let owners = &self.slot_of_node;
         fresh.extend((tets.iter().flatten()).filter(|node| owners[**node as usize] == PADDING));
@@ -195,6 +208,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         })
     }
 
+    /// From places in the list that was packed to numbers of elements.
     fn renumber(&mut self, batches: std::ops::Range<usize>, number: impl Fn(u32) -> u32) {
         for element in self.elements[batches].as_flattened_mut().as_flattened_mut() {
             if *element != PADDING {
@@ -229,6 +243,7 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
                 push(&mut touched, batch)?;
             }
         }
+        // A lane that is still in use, of this batch or else of any of the chunk.
         let live = |batch: usize| (0..WIDTH).find(|lane| self.elements[batch][0][*lane] != PADDING);
         let Some(any) = batches
             .clone()

@@ -1,4 +1,9 @@
 //! Run-time choice of the instruction set, and the kernels compiled for each.
+//!
+//! A kernel is generic over its lanes and inlined into one function for each set, which carries
+//! `target_feature`. Those functions are kept as pointers ([`Kernels`]), chosen once when a body is
+//! packed, so that no call looks at the processor again. What differs by law is decided here, once
+//! a chunk, outside of all loops.
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: each function is chosen where the machine has its instruction set"
@@ -17,21 +22,28 @@ use lanes::{Isa, NodeLanes, WIDTH};
 
 /// With `true` the pressure of an element comes from its nodes' dilatation, the fourth components of their positions.
 type ForceKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4], bool) -> f32;
+/// Adds each element's volume times its bulk modulus to the third component of its corners' slots.
 type VolumeKernel = unsafe fn(&Partition, &Chunk, *const [f32; 4], *mut [f32; 4]);
 /// Displacements by slot, and two rows of forces of which the second may be null.
 type RelaxKernel =
     unsafe fn(&Partition, &Chunk, &StressStep, [*mut f32; 3], *const [f32; 4], [*mut [f32; 4]; 2]);
+/// `positions = rest + displacement`, see [`place`].
 type PlaceKernel = unsafe fn(usize, *const [f32; 4], *const [f32; 4], *mut [f32; 4]);
+/// One explicit step of the nodes, see [`advance`].
 type AdvanceKernel = unsafe fn(usize, f32, *const [f32; 4], *mut [f32; 4], *mut [f32; 4]);
 
 /// The kernels of one instruction set.
 #[derive(Clone, Copy)]
 pub struct Kernels {
+    /// Adds the forces of a chunk's elements to its slots; returns the smallest det F.
     pub forces: ForceKernel,
+    /// For nodal dilatation.
     pub volumes: VolumeKernel,
     /// Takes a state into what a chunk's elements remember of their stresses ([`crate::StressHistory::pointers`]), and adds what that pushes with.
     pub relax: RelaxKernel,
+    /// `positions = rest + displacement` of a chunk's slots.
     pub place: PlaceKernel,
+    /// One explicit step of a chunk's slots.
     pub advance: AdvanceKernel,
 }
 
@@ -45,6 +57,7 @@ unsafe fn all_forces<L: Eigenvalues>(
     averaged: bool,
 ) -> f32 {
     unsafe {
+        // All elements of a chunk have one law, so this is the only branch on it.
         let law = partition.moduli_of(chunk).law;
         let matrix = law.matrix();
         let smallest = match (matrix, Seconds::of(matrix)) {
@@ -54,6 +67,7 @@ unsafe fn all_forces<L: Eigenvalues>(
             }
             (_, None) => forces_by_stretches::<L>(partition, chunk, nodes, forces, averaged),
         };
+        // In a second pass over the chunk's slots, which the first has left in the cache.
         if let Some(fibres) = law.fibres() {
             let fibres = LaneFibres::new(fibres, partition.moduli.shear_pa);
             forces_of_fibres::<L>(&fibres, partition, chunk, nodes, forces);
@@ -164,6 +178,8 @@ unsafe fn all_histories<L: Eigenvalues>(
 ) {
     unsafe {
         let moduli = partition.moduli_of(chunk);
+        // The material's modulus is that of the elements, `g0` times the law's; the history is of
+        // the law's own.
         let shear = moduli.shear_pa * step.stiffer;
         let terms = LaneTerms::new(&moduli.law, [shear, moduli.bulk_pa]);
         let fibres = moduli.law.fibres();
@@ -177,6 +193,7 @@ unsafe fn all_histories<L: Eigenvalues>(
         let of_pairs = of_pairs.add(chunk.pairs.start * 2 * batch);
         let of_singles = of_singles.add(chunk.singles.start * batch);
         let (octahedra, pairs, singles) = ((octahedra, a, d), (pairs, b, e), (singles, c, f));
+        // Two copies of the code, so that one row of forces costs no branch in the inner loop.
         if forces[1].is_null() {
             relax::<L, 6, 4, 1>(law, step, octahedra, of_octahedra, nodes, forces);
             relax::<L, 5, 2, 1>(law, step, pairs, of_pairs, nodes, forces);

@@ -26,6 +26,7 @@ pub struct StressHistory {
     /// By kind of cluster, batch, tetrahedron, `S_iso` before the `q_i`, component, lane; Pa, over the element's own stiffness.
     values: [Vec<f32>; 3],
     /// Slots of the second row of forces.
+    /// Room alone: nothing in it outlives a call.
     second: Vec<Line>,
     /// By number of a law, for the step at hand.
     steps: Vec<StressStep>,
@@ -112,6 +113,7 @@ impl StressHistory {
         Ok(())
     }
 
+    /// Calls with the number of the element in the mesh, the place in its row and the value.
     fn each(&self, partition: &Partition, mut call: impl FnMut(u32, usize, f32)) {
         for (kind, values) in self.values.iter().enumerate() {
             visit(partition, kind, self.branches, |number, k, at| {

@@ -17,9 +17,11 @@ use std::collections::TryReserveError;
 /// workers that `Scratch::new` was given, and two tasks that run at once have different ones.
 pub type ParallelFor<'a> = &'a dyn Fn(usize, &(dyn Fn(usize, usize) + Sync));
 
-/// Chunks that a body is split into at least, where each has [`FEWEST_ELEMENTS`]: the far field of a scene takes its means over them.
+/// Chunks that a body is split into at least, where each has [`FEWEST_ELEMENTS`]: the far field of
+/// a scene takes its means over them. It is a number, not one of threads, so that the bits stay.
 const CHUNKS: usize = 96;
-/// Elements of a chunk at least.
+/// Elements of a chunk at least: the smaller a chunk, the larger the part of its nodes that are
+/// ghosts.
 const FEWEST_ELEMENTS: usize = 256;
 
 /// The elements of a body, ready for [`ElementForces::evaluate`].
@@ -31,7 +33,8 @@ pub struct ElementForces {
     parents: Vec<u32>,
 }
 
-/// A slot as the kernels read it.
+/// Four slots, `[x, y, z, w]` each: a cache line, so that a list of them is aligned for any
+/// register.
 #[derive(Clone, Copy, Default)]
 #[repr(C, align(64))]
 pub(crate) struct Line(pub(crate) [[f32; 4]; 4]);
@@ -39,6 +42,7 @@ pub(crate) struct Line(pub(crate) [[f32; 4]; 4]);
 /// Buffers of an evaluation; kept between calls.
 pub struct Scratch {
     /// Forces by slot.
+    /// Between the two phases a ghost's slot holds what its chunk's elements add to that node.
     pub(crate) forces: Vec<Line>,
     /// Node positions of the chunk at hand, a row a worker.
     pub(crate) positions: Vec<Vec<Line>>,
@@ -91,6 +95,7 @@ impl ElementForces {
     }
 
     /// The same kernels over what a cut has made of the body.
+    /// `K`.
     pub(crate) fn with(&self, partition: Partition, parents: Vec<u32>, node_count: usize) -> Self {
         Self {
             partition,
@@ -158,6 +163,7 @@ impl ElementForces {
         let positions = Shared(scratch.positions.as_mut_ptr());
         let smallest = Shared(scratch.smallest.as_mut_ptr());
         let chunks = &self.partition.chunks;
+        // First phase: no chunk writes to a slot of another, so there is nothing to wait for.
         parallel(chunks.len(), &|index, worker| {
             let chunk = &chunks[index];
             // SAFETY: positions belong to this worker, slots and the entry of `smallest` to this chunk.
@@ -170,6 +176,7 @@ impl ElementForces {
                 *smallest.at(index) = det;
             }
         });
+        // Second phase, after all of the first: `parallel` returns when every task is done.
         let out = Shared(out.as_mut_ptr().cast::<[f32; 3]>());
         parallel(chunks.len(), &|index, _| {
             let chunk = &chunks[index];
@@ -184,6 +191,7 @@ impl ElementForces {
                 }
                 for slot in chunk.first..chunk.first + chunk.owned {
                     let [x, y, z, _] = *forces.at(slot);
+                    // The kernels add forces on the tissue; `f_int` is their opposite.
                     *out.at(self.partition.node_of_slot[slot] as usize) = [-x, -y, -z];
                 }
             }
@@ -193,6 +201,7 @@ impl ElementForces {
 }
 
 /// Puts the nodes of a chunk where they are now, from its centre.
+/// For a law that takes displacements the base is zero, and the displacements go in as they are.
 pub(crate) unsafe fn place(
     partition: &Partition,
     chunk: &Chunk,

@@ -59,6 +59,7 @@ pub fn flops(nodes: usize, tets: usize, law: &Law) -> usize {
     }
 }
 
+/// A law by invariants. Counted by hand from the three loops; benches print a rate over it.
 fn flops_of<M: Isochoric>(_: M, nodes: usize, tets: usize) -> usize {
     let ring = nodes - 2;
     // Edges, their squares and what they share with the edge 0-1: cross and dot products.
@@ -105,6 +106,7 @@ pub unsafe fn add_forces<L: NodeLanes, M: SecondLoop, const NODES: usize, const 
 ) -> f32 {
     unsafe {
         let mut smallest = L::splat(f32::MAX);
+        // `buffer` belongs to this call: each batch overwrites all that it reads.
         for cluster in clusters {
             for first in (0..WIDTH).step_by(L::COUNT) {
                 if M::SECOND {
@@ -113,6 +115,7 @@ pub unsafe fn add_forces<L: NodeLanes, M: SecondLoop, const NODES: usize, const 
                     shape::<L, false, NODES, TETS>(cluster, first, nodes, averaged, buffer);
                 }
             }
+            // The next batch's constants are a kilobyte or two that this loop alone would wait for.
             prefetch(std::ptr::from_ref(cluster).wrapping_add(1));
             // Two loops, since a branch within one would keep its iterations from overlapping.
             let least = if averaged {
@@ -129,6 +132,7 @@ pub unsafe fn add_forces<L: NodeLanes, M: SecondLoop, const NODES: usize, const 
                 }
             }
         }
+        // Lanes meet at the very end. A smallest number does not depend on the order.
         let mut lanes = [f32::MAX; WIDTH];
         smallest.store(lanes.as_mut_ptr());
         lanes.into_iter().fold(f32::MAX, f32::min)
@@ -137,6 +141,7 @@ pub unsafe fn add_forces<L: NodeLanes, M: SecondLoop, const NODES: usize, const 
 
 /// Adds each element's current volume times its bulk modulus (nJ) to the third component of its corners' `forces`.
 #[inline(always)]
+/// Summed over a node's elements and compared with that at rest it gives the node's dilatation.
 pub unsafe fn add_volumes<L: NodeLanes, const NODES: usize, const TETS: usize>(
     clusters: &[Cluster<NODES, TETS>],
     nodes: *const [f32; 4],

@@ -28,6 +28,7 @@ struct Shape {
 }
 
 impl Shape {
+    /// From a deformation gradient, rows.
     fn new(f: &[[f64; 3]; 3]) -> Self {
         let mut h = *f;
         for i in 0..3 {
@@ -57,6 +58,8 @@ impl Shape {
         if r == 0.0 {
             return [0.0; 3];
         }
+        // `D` has no trace, so its characteristic polynomial is `d^3 - j2 d - j3`, with the roots
+        // `2 r cos(angle + 2 pi k / 3)`.
         let cosine = (self.j3 / (2.0 * r * r * r)).clamp(-1.0, 1.0);
         let angle = libm::acos(cosine) / 3.0;
         let first = 2.0 * r * libm::cos(angle);

@@ -30,6 +30,7 @@ pub unsafe fn place<L: NodeLanes>(
 ///
 /// The fourth components, gain and dilatation, stay.
 #[inline(always)]
+/// `g` is zero at a node that is held, which then keeps its place.
 pub unsafe fn advance<L: NodeLanes>(
     count: usize,
     beta: f32,

@@ -12,13 +12,17 @@ use lanes::WIDTH;
 use std::collections::TryReserveError;
 use std::ops::Range;
 
-/// Slots of a piece, at most: a slot's double is 16 bits wide.
+/// Slots of a piece, at most: a slot's double is 16 bits wide. A chunk of the body has at most 2048
+/// elements of four nodes, so each fits into an empty piece.
 const MOST_SLOTS: usize = 8192;
 
 /// Clusters of a body. [`Subset::clear`], [`Subset::push`] chunk by chunk and [`Subset::finish`] fill it in the room that it has.
 pub struct Subset {
+    /// The pieces, as chunks that own all of their nodes: a node of two pieces has a slot in both.
     partition: Partition,
+    /// Those of the body.
     kernels: Kernels,
+    /// Of the piece being filled; all [`PADDING`] between two fillings.
     slots: Slots,
     /// Lanes of the last batch of each kind that are in use.
     used: [usize; 3],
@@ -26,7 +30,9 @@ pub struct Subset {
     starts: [usize; 4],
     /// The law of the piece being filled.
     law: u8,
+    /// By slot of the piece at hand, for the widest one.
     positions: Vec<Line>,
+    /// As long; zeroed for each piece.
     forces: Vec<Line>,
 }
 
@@ -34,12 +40,15 @@ pub struct Subset {
 struct Slots {
     /// By mesh node; [`PADDING`] where it has none.
     of_node: Vec<u32>,
+    /// Where the piece's slots start in the list of all.
     first: usize,
 }
 
 /// The chunk of the body that clusters are taken from.
 struct Source<'a, F> {
+    /// Mesh node of each of its slots.
     nodes: &'a [u32],
+    /// Whether forces are asked for at a node.
     is_wanted: F,
 }
 
@@ -118,6 +127,7 @@ impl Subset {
     ///
     /// # Errors
     /// No memory.
+    /// `positions [K,3]` are the body's at rest, mm. Only after it may the subset be evaluated.
     pub fn finish(&mut self, positions: &[[f32; 3]]) -> Result<(), TryReserveError> {
         self.end_piece()?;
         let partition = &mut self.partition;
@@ -141,6 +151,7 @@ impl Subset {
         Ok(())
     }
 
+    /// What has been filled becomes a chunk. The next piece begins on a whole cache line of slots.
     fn end_piece(&mut self) -> Result<(), TryReserveError> {
         let partition = &mut self.partition;
         let [first, octahedra, pairs, singles] = self.starts;
@@ -248,6 +259,7 @@ impl Slots {
         Ok(*slot as u16)
     }
 
+    /// A few nodes are reset, not the whole list: it is as long as the mesh.
     fn forget(&mut self, nodes: &[u32]) {
         for &node in nodes.iter().filter(|node| **node != PADDING) {
             self.of_node[node as usize] = PADDING;
@@ -281,6 +293,7 @@ impl<F: Fn(u32) -> bool> Source<'_, F> {
                 }
                 *used = own.copy(from, (batch, lane), here, *used)?;
                 for (bulk, inverse) in cluster.bulk.iter().zip(&cluster.inverse) {
+                    // `kappa / 6` over `1 / det D0 = 1 / (6 V)`: both signs cancel.
                     sum += f64::from(bulk[lane]) / f64::from(inverse[lane]);
                 }
             }

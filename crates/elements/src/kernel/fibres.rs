@@ -15,6 +15,7 @@ use lanes::{FunctionLanes, NodeLanes, WIDTH};
 pub struct LaneFibres {
     /// `2 k1`, Pa.
     twice_pa: f32,
+    /// Exponent of the law, without unit.
     k2: f32,
     /// Where the exponential ends.
     end: f32,
@@ -35,7 +36,9 @@ impl LaneFibres {
     unsafe fn pull<L: FunctionLanes>(&self, x: L) -> L {
         unsafe {
             let one = L::splat(1.0);
+            // Slack fibres do not push.
             let x = x.max(L::splat(0.0));
+            // Beyond `end` the exponential goes on as its tangent: no finite stretch overflows.
             let within = x.min(L::splat(self.end));
             let y = within.mul(within).mul(L::splat(self.k2));
             let slope = y.add(y).add(one);
@@ -82,6 +85,8 @@ pub unsafe fn add_forces_of_fibres<L: NodeLanes, const NODES: usize, const TETS:
 ) {
     unsafe {
         let zero = L::splat(0.0);
+        // The sum over positions gives `F a`, over displacements `H a`: one multiply-add serves
+        // both.
         let rest = L::splat(if from_positions { 1.0 } else { 0.0 });
         for (cluster, directions) in clusters.iter().zip(directions) {
             for first in (0..WIDTH).step_by(L::COUNT) {

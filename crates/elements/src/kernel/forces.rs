@@ -1,4 +1,10 @@
 //! The third loop of a batch: forces on the nodes, in balance by construction.
+//!
+//! Forces on corners 1, b and c of a tetrahedron are the columns of `M E + factor cof D`, with the
+//! spring constants `M = -V mu J^(-2/3) G` or those that a law with `I2` has made, and the columns
+//! `e_b x e_c`, `e_c x e_1` and `e_1 x e_b` of `cof D`. Springs between the same two nodes are
+//! added up over the tetrahedra first, so that each meets its edge once. Node 0 gets minus the sum
+//! of the others: the balance of a cluster is exact to the rounding of that sum.
 
 use super::shape::{Shape, load};
 use crate::cluster::{Cluster, corners};
@@ -24,6 +30,7 @@ struct Pull<L, const NODES: usize, const TETS: usize> {
     along: [L; NODES],
     /// Of a tetrahedron's corners b and c.
     face: [L; TETS],
+    /// `-V / det D0` times the bracket of the module's equation, with the sign of det D0.
     factor: [L; TETS],
 }
 
@@ -51,6 +58,7 @@ pub(super) unsafe fn scatter<
         for tet in 0..TETS {
             let [_, b, c] = corners::<NODES>(tet);
             let by = load::<L>(&shape.determinant[tet], first);
+            // A law without `I2` has constant springs, which `by` scales; else they were made anew.
             let m = if SECOND {
                 &shape.products[tet]
             } else {
@@ -70,6 +78,8 @@ pub(super) unsafe fn scatter<
         add_node::<L, NODES, TETS, 1>(cluster, first, shape, &pull, forces, &mut rest);
         add_node::<L, NODES, TETS, 2>(cluster, first, shape, &pull, forces, &mut rest);
         add_node::<L, NODES, TETS, 3>(cluster, first, shape, &pull, forces, &mut rest);
+        // Written out, not a loop: each call has its node as a constant and keeps the branches that
+        // concern it.
         if NODES > 4 {
             add_node::<L, NODES, TETS, 4>(cluster, first, shape, &pull, forces, &mut rest);
         }
@@ -109,6 +119,7 @@ unsafe fn add_node<L: NodeLanes, const NODES: usize, const TETS: usize, const NO
                 if NODE == 1 {
                     force[i] = factor.mul_add(load(&shape.face[tet][i], first), force[i]);
                 }
+                // `e_c x e_1` is minus the stored `e_1 x e_c`.
                 if NODE == b {
                     let edge = load::<L>(&shape.edge[c - 1][i], first);
                     force[i] = pull.face[tet].mul_add(edge, force[i]);

@@ -10,7 +10,7 @@ use crate::cluster::{Cluster, corners};
 use crate::gradients::Gradients;
 use lanes::{NodeLanes, WIDTH};
 
-/// `|J|` at least in `T / J`, as in f64.
+/// `|J|` at least in `T / J`, as in f64, so that the force of a flat element is finite.
 const LEAST_DET: f32 = crate::tetrahedron::LEAST_DET as f32;
 
 /// `H` of one tetrahedron, rows, from the differences of its corners' displacements.
@@ -51,6 +51,8 @@ pub(super) unsafe fn volume<L: NodeLanes>(h: &[[L; 3]; 3]) -> ([[L; 3]; 3], L) {
         let trace = h[0][0].add(h[1][1]).add(h[2][2]);
         let minors = cofactor[0][0].add(cofactor[1][1]).add(cofactor[2][2]);
         let determinant = dot(h[0], cofactor[0]);
+        // Each summand is of the size of the strain or smaller: no digits cancel against the 1 of
+        // `det F`.
         let change = trace.add(minors.add(determinant));
         for i in 0..3 {
             for j in 0..3 {
@@ -104,11 +106,14 @@ pub unsafe fn add_forces_of_stretches<L: Eigenvalues, const NODES: usize, const 
                     let (cofactor, change) = volume(&h);
                     let det = change.add(one);
                     smallest = det.min(smallest);
+                    // Away from zero on the side on which it is.
                     let bounded = det.below(
                         zero,
                         det.min(L::splat(-LEAST_DET)),
                         det.max(L::splat(LEAST_DET)),
                     );
+                    // Averaged over the corners' nodes it does not lock nearly incompressible
+                    // tetrahedra.
                     let dilatation = if averaged { mean[tet] } else { change };
                     // Both with the sign of a force on the tissue, and the volume.
                     let volume = zero.sub(load::<L>(&gradients.volume[tet], first));
@@ -122,6 +127,7 @@ pub unsafe fn add_forces_of_stretches<L: Eigenvalues, const NODES: usize, const 
                         }
                         inner[i][i] = inner[i][i].add(pressure);
                     }
+                    // `P = cof F (T / J + kappa (J - 1))`, row by row; `inner` is symmetric.
                     let mut stress = inner;
                     for i in 0..3 {
                         for j in 0..3 {
@@ -166,6 +172,7 @@ pub unsafe fn add_volumes_of_stretches<L: NodeLanes, const NODES: usize, const T
                     let [a, b, c] = corners::<NODES>(tet);
                     let rows = &gradients.rows[tet];
                     let (_, change) = volume(&gradient(rows, first, of_corners(tet, &edge)));
+                    // Volume at rest times `1 + (J - 1)`.
                     let rest = load::<L>(&gradients.volume[tet], first).mul(L::splat(bulk_pa));
                     let volume = rest.mul_add(change, rest);
                     for corner in [0, a, b, c] {

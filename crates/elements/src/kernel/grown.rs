@@ -17,6 +17,7 @@ pub(super) unsafe fn grown<L: NodeLanes>(
 ) -> [L; 6] {
     unsafe {
         let root = inverse_cube_root(x.add(L::splat(1.0)));
+        // `I1` without change of volume, less 3: the argument that the law's growth takes.
         let x = root.mul_add(L::splat(3.0), L::splat(-3.0));
         let first = grows.lane_growth(x).mul(root).mul(L::splat(a));
         // 1 / (r (1 + x')) is r².

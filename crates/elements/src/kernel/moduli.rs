@@ -1,4 +1,8 @@
 //! The second loop of a batch: how strongly springs and pressure pull, by the law and the change of volume.
+//!
+//! It reads `det D` and `-mu V I1` of each tetrahedron and puts in their place the factor of the
+//! springs and the factor of `cof D`, so that the third loop needs no law. Everything that a law
+//! differs in is here; the first loop and the third are the same code for laws of one kind.
 
 use super::shape::{Shape, load, store};
 use crate::cluster::Cluster;
@@ -67,7 +71,9 @@ impl<M: Isochoric> SecondLoop for M {
 /// Laws with `I2`: the first and the third loop are the same code.
 #[derive(Clone, Copy)]
 pub enum Seconds {
+    /// Constant moduli on `I1` and `I2`.
     MooneyRivlin(MooneyRivlin),
+    /// A modulus that grows with `I1`.
     Grows(Grows),
 }
 
@@ -131,7 +137,10 @@ unsafe fn moduli<
         let determinant = load::<L>(&shape.determinant[tet], first);
         let inverse = load::<L>(&cluster.inverse[tet], first);
         let ratio = determinant.mul(inverse);
+        // An element that is flat or turned inside out has the isochoric factor of a thin one:
+        // finite, and the pressure, which takes `J` as it is, drives it back.
         let root = inverse_cube_root(L::splat(1e-3).max(ratio));
+        // `1 - J`, or minus the mean of the four corners' dilatation.
         let loss = if AVERAGED {
             load::<L>(&shape.dilatation[tet], first).mul(L::splat(-0.25))
         } else {
@@ -158,6 +167,8 @@ unsafe fn moduli<
             volume[0].neg_mul_add(sum, pressure)
         } else {
             let slopes = law.lane_slopes(inverse.mul(invariant), inverse, root);
+            // In place: the determinant is not needed any more, and the third loop reads the factor
+            // there.
             store(slopes.first, &mut shape.determinant[tet], first);
             slopes.volume[0].neg_mul_add(slopes.volume[1], pressure)
         };
@@ -199,10 +210,12 @@ unsafe fn springs<L: NodeLanes, M: Isochoric, const NODES: usize, const TETS: us
         for j in 0..3 {
             trace = product[j][j].mul_add(product[j][j], trace);
         }
+        // `I1^2 - tr (E G)^2 = 2 I2`; `invariant` has its factor `-mu V` divided out already.
         let squares = scale
             .mul(scale)
             .neg_mul_add(trace, invariant.mul(invariant));
         let slopes = law.lane_slopes(invariant, squares.mul(L::splat(0.5)), root);
+        // `f1 G + f2 (I1 G - G E G)`, see `kernel.rs`.
         let own = slopes.second.mul_add(invariant, slopes.first);
         let less = slopes.second.mul(scale);
         for j in 0..3 {

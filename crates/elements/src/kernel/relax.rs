@@ -13,11 +13,12 @@ use crate::principal::PLACE;
 use crate::stress_step::{SIX, StressStep};
 use lanes::{NodeLanes, WIDTH};
 
-/// An element below this det F keeps the stress that it had.
+/// An element below this det F keeps the stress that it had: what it has now says nothing about the
+/// tissue, and would be remembered for as long as its slowest branch.
 const SOUND_DET: f32 = 0.05;
-/// Bytes of a line of the cache.
+/// Bytes of a line of the cache: what one prefetch asks for.
 const LINE: usize = 64;
-/// `J²` at least.
+/// `J²` at least: the square of the least `|J|` of [`super::gradients`].
 const LEAST_SQUARE: f32 = 1e-4;
 
 /// `C^-1 T` from `cof F`, `det F` and `T`, Pa.
@@ -77,6 +78,10 @@ type Batches<'a, const NODES: usize, const TETS: usize> = (
 
 /// Takes the stresses at displacements (mm) into the `history` of the clusters, and adds the forces (µN) of the first `ROWS` rows of weights.
 #[inline(always)]
+///
+/// `history` holds `[batch, tet, count + 1, 6, 16]` numbers, Pa: of each tetrahedron `S_iso` of the
+/// state before, then the `q_i`. They are read and written in one pass, so a call takes the history
+/// exactly one state further and must not be repeated for the same state.
 pub unsafe fn relax<L: Eigenvalues, const NODES: usize, const TETS: usize, const ROWS: usize>(
     (law, fibres): (&LaneTerms, Option<&LaneFibres>),
     step: &StressStep,
@@ -108,6 +113,8 @@ pub unsafe fn relax<L: Eigenvalues, const NODES: usize, const TETS: usize, const
                     }
                     let own = history.add(tet * (step.count + 1) * row + first);
                     if first == 0 {
+                        // One tetrahedron's history of the next batch, while this one's is worked
+                        // on.
                         let lines = (step.count + 1) * SIX;
                         ahead(own, 4 * TETS * lines * WIDTH, lines);
                         ahead(rows.as_ptr(), size_of_val(gradients), rows.len());
@@ -117,6 +124,8 @@ pub unsafe fn relax<L: Eigenvalues, const NODES: usize, const TETS: usize, const
                     let mut sums = [[zero; SIX]; ROWS];
                     for k in 0..SIX {
                         let before = L::load(own.add(k * WIDTH));
+                        // A NaN in `det` fails the comparison and goes on into the stress; the
+                        // guard finds it.
                         let now = det.below(L::splat(SOUND_DET), before, now[k]);
                         now.store(own.add(k * WIDTH));
                         let change = now.sub(before);
@@ -138,6 +147,7 @@ pub unsafe fn relax<L: Eigenvalues, const NODES: usize, const TETS: usize, const
                         }
                     }
                     for side in 0..ROWS {
+                        // `F S = S + H S`: forces act on the deformed element.
                         let symmetric = |i: usize, j: usize| sums[side][PLACE[i][j]];
                         let mut pushed = [[zero; 3]; 3];
                         for i in 0..3 {

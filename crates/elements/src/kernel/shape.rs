@@ -1,4 +1,8 @@
 //! The first loop of a batch: nodes gathered, and what the edges of its tetrahedra have between them.
+//!
+//! Whatever does not depend on the law: edges, their cross and dot products, `det D` and the
+//! invariant `I1 = sum_jk G_jk e_j . e_k`. The stored springs are `-mu V G`, so the sum over them
+//! is `-mu V I1`, an energy in nJ.
 
 use crate::cluster::{Cluster, corners};
 use lanes::{NodeLanes, WIDTH};
@@ -27,6 +31,7 @@ pub struct Shape {
 }
 
 impl Shape {
+    /// Zeros; each batch writes what it reads.
     pub const EMPTY: Self = Self {
         edge: [[[0.0; WIDTH]; 3]; 5],
         across: [[[0.0; WIDTH]; 3]; 4],
@@ -142,6 +147,7 @@ pub(super) unsafe fn shape<
                     store(products[k], &mut out.products[tet][k], first);
                 }
             }
+            // Off-diagonal entries count twice.
             let mixed = load::<L>(&m[4], first).mul(between);
             let mixed = load::<L>(&m[2], first).mul_add(along[c], mixed);
             let mixed = load::<L>(&m[1], first).mul_add(along[b], mixed);

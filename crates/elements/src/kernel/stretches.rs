@@ -13,7 +13,9 @@ use lanes::functions::{exp_m1, ln_1p, third_of_angle};
 
 /// `e^3`, where the exponential goes on as its tangent.
 const CAPPED: f32 = 20.085_537;
-/// Eigenvalues of `D` closer than this have a derivative in place of a difference.
+/// Eigenvalues of `D` closer than this have a derivative in place of a difference: below it the
+/// rounding of a difference in f32 weighs more than the error of the derivative at the middle,
+/// which falls with the square of the gap. [`crate::principal`] has a smaller one for f64.
 const COINCIDENT: f32 = 2e-3;
 /// With all of them closer than this the series is more accurate.
 const SMALL: f32 = 4e-3;
@@ -25,12 +27,15 @@ const LEAST: f32 = 1e-6;
 pub struct LaneTerms {
     /// `mu`, Pa.
     mu: [f32; MOST_TERMS],
+    /// Exponents of the stretches.
     alpha: [f32; MOST_TERMS],
     /// `alpha / 2`, where all are whole numbers.
     power: [i32; MOST_TERMS],
+    /// Terms that there are; what is behind them is zero.
     count: usize,
     /// Whether they are.
     whole: bool,
+    /// `kappa`, Pa.
     pub bulk_pa: f32,
     /// How the first term grows with the shape; the second is then of exponent -2.
     grows: Option<Grows>,
@@ -65,7 +70,9 @@ pub struct Strain<L> {
     d: [L; 6],
     /// `D²`.
     square: [L; 6],
+    /// `D:D / 2`, the size of the strain squared.
     j2: L,
+    /// `det D`.
     j3: L,
     /// `det (1 + D) - 1`.
     x: L,
@@ -142,6 +149,7 @@ unsafe fn joined<L: NodeLanes>(a: &[L; 6], b: &[L; 6]) -> [L; 6] {
 unsafe fn power<L: NodeLanes>(x: [L; 6], n: u32) -> [L; 6] {
     unsafe {
         let mut out = x;
+        // From the second highest bit down; the highest is `x` itself.
         for bit in (0..n.ilog2()).rev() {
             out = joined(&out, &out);
             if n >> bit & 1 == 1 {
