@@ -1,4 +1,7 @@
 //! The body that the corrections move: element forces and lumped mass.
+//!
+//! Shared by all scenes of a model and never changed: a cut makes another one. Mass is lumped, so
+//! that `M` is diagonal and inertia costs a multiplication for each number.
 
 use elements::{ElementForces, Material};
 

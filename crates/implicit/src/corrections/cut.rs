@@ -24,7 +24,8 @@ use crate::error::Result;
 use crate::memory;
 use crate::prior::{Lost, LostElements, PriorTable};
 
-/// A factor of volume or stiffness that has changed by less has not.
+/// A factor of volume or stiffness that has changed by less has not: the shares of an element that
+/// was parted and lost nothing sum to one but for rounding.
 const SAME: f64 = 1e-9;
 const WHAT: &str = "the corrections of a cut body";
 
@@ -96,6 +97,8 @@ impl Corrections {
             .iter()
             .map(|cell| cell.share * f64::from(cell.stiffness))
             .sum();
+        // A cut that only parts an element changes no product of the modes: both pieces move as one
+        // there.
         if (1.0 - share).abs() < SAME && (1.0 - stiff).abs() < SAME {
             return None;
         }
@@ -105,6 +108,7 @@ impl Corrections {
         let whole = Tetrahedron::new(corners, rest, 1.0);
         let mut lost = Tetrahedron::new(corners, rest, f64::from(own));
         let laws = mesh.tetrahedra().laws;
+        // kg/m³ in g/mm³.
         let density = 1e-6 * laws.density_of(element as usize, material.density_kg_m3);
         let moduli = material.moduli();
         lost.volume *= 1.0 - stiff;
@@ -153,8 +157,11 @@ impl Corrections {
         own.blocks.extend_from_slice(&whole.blocks);
         own.blocks.resize(count, [0.0; 6]);
         let first = intact.node_count() as u32;
+        // Elements of the intact mesh with a touched node, each once.
         let mut around = Vec::new();
         for &node in touched {
+            // Sums are made anew and in one order, not corrected: the result depends on the body
+            // alone.
             own.mass[node as usize] = 0.0;
             own.blocks[node as usize] = [0.0; 6];
             if node < first {
@@ -174,6 +181,8 @@ impl Corrections {
             let density = 1e-6 * laws.density_of(parent as usize, material.density_kg_m3);
             let mass = 0.25 * volume * density;
             for (node, block) in corners.into_iter().zip(tet.diagonal_blocks(moduli)) {
+                // Only some corners of an element are touched; the others keep the sums that they
+                // have.
                 if touched.binary_search(&node).is_err() {
                     continue;
                 }
@@ -196,6 +205,7 @@ impl Corrections {
         Ok(own)
     }
 
+    /// The elements: those of the intact body without the changed ones, and the cells behind them.
     fn cut_body(
         &self,
         (intact, cut): (&Mesh, &Mesh),

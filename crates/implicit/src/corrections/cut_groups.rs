@@ -16,6 +16,7 @@ impl Corrections {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
+    /// A group that has answers already keeps them.
     pub fn follow_groups(
         &self,
         context: SolverContext<'_>,

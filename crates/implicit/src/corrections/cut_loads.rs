@@ -1,4 +1,7 @@
 //! What steps under loads need of a body that has been cut: the intact body's whole modes on it.
+//!
+//! Whole modes are large and made by an eigenvalue solve, so a cut body goes on with those of the
+//! intact one: a copy of a node moves as its parent, and the products lose what the cut has taken.
 
 use topology::Body as CutBody;
 

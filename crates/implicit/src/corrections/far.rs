@@ -24,7 +24,8 @@ use crate::memory::{self, HeldBytes};
 use crate::prior::{CoarseSpace, PriorTable};
 
 const WHAT: &str = "the far field of the corrections";
-/// Clusters that a body has at least, where its chunks are as many.
+/// Clusters that a body has at least, where its chunks are as many: the number that `elements` aims
+/// at, so that a cluster is one chunk until a body has twice as many.
 const CLUSTERS: usize = 96;
 /// Numbers of a deformation gradient.
 pub(super) const NINE: usize = 9;
@@ -41,6 +42,7 @@ pub struct FarField {
     /// elements have become.
     pub(super) volumes: Vec<f64>,
     pub(super) packed: PackedChunks,
+    /// What gives the mean gradient of a chunk under a field.
     borders: Borders,
     /// `sum_e v_e grad Phi` of each chunk on the modes `[C,9,r]`, rows of the gradient one after another.
     pub(super) on_modes: Vec<f32>,
@@ -63,6 +65,7 @@ struct ClusterLaws {
 }
 
 impl ClusterLaws {
+    /// For a cut body, whose clusters have the same laws and fibres.
     fn copied(&self) -> Result<Self> {
         Ok(Self {
             laws: memory::copied(&self.laws, WHAT)?,
@@ -106,6 +109,7 @@ pub(super) struct PackedChunks {
 struct Borders {
     /// Where each chunk's nodes start in the two lists `[C+1]`.
     starts: Vec<u32>,
+    /// Mesh nodes, chunk after chunk, in the order of each chunk's list.
     nodes: Vec<u32>,
     /// `sum_e v_e grad N` of such a node, mm².
     weights: Vec<[f32; 3]>,
@@ -206,6 +210,7 @@ impl FarField {
         Ok(own)
     }
 
+    /// Adds a chunk: its volume, box, border and its share in the lists by node and element.
     fn push(&mut self, body: &Body, mesh: &Mesh, chunk: usize) -> Result<()> {
         let nodes = body.forces.chunk_nodes(chunk);
         let mut sums = memory::filled(nodes.len(), [0.0f64; 3], WHAT)?;
@@ -262,6 +267,7 @@ impl FarField {
             memory::zeros(prior.width(), WHAT)?,
             memory::zeros(held, WHAT)?,
         );
+        // Once a model, where no scene's threads are at hand yet.
         let pool = Pool::of(space.isa(), 1)?;
         for mode in 0..count {
             space.read_mode(mode, &mut q);
@@ -315,6 +321,8 @@ impl FarField {
             add_mean_stress(fibres, &f, (own, moduli.shear_pa), &mut stress);
         }
         let lambda = self.moduli.bulk_pa - 2.0 / 3.0 * self.moduli.shear_pa;
+        // Linear elasticity of the material is what the modes and the stiffness at rest have
+        // already.
         let trace = h[0] + h[4] + h[8];
         let mut added = [0.0; NINE];
         for i in 0..3 {

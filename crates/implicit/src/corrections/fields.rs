@@ -1,4 +1,7 @@
 //! The fields `[K,3]` that a step iterates on. Between two steps they hold nothing that counts.
+//!
+//! They are made with the scene, since a step may not allocate. Each has several uses in the course
+//! of a step, named below; a function that needs one says which it writes over.
 
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};

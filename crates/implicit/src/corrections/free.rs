@@ -12,7 +12,8 @@ use super::relax::FieldStep;
 use super::solver::{ImplicitSolver, SMALLEST_DET};
 use crate::error::Result;
 
-/// What of the last field stays in a step where no free motion was found.
+/// What of the last field stays in a step where no free motion was found: it dies away over some
+/// tens of steps in place of a jump to rest.
 const KEPT: f32 = 0.8;
 
 impl FieldStep<'_> {
@@ -75,6 +76,7 @@ impl FieldStep<'_> {
 
     /// BDF2 about the free swing of the natural modes: the modes' error under BDF2 is taken off before the iterations, which then have the rest of the field and the
     /// law's nonlinearity to balance.
+    /// `g` is the residual of `u` on return.
     fn swing_from(&mut self, u: &mut [f32], g: &mut [f32]) -> Result<()> {
         let (context, input) = (self.context, self.input);
         let (h, kappa) = (
@@ -150,6 +152,7 @@ impl FieldStep<'_> {
     }
 
     /// BDF2 alone, from the free motion of the natural modes.
+    /// For a body of which a group is let go, whose natural modes nobody knows.
     fn balance_from(&mut self, u: &mut [f32], g: &mut [f32]) -> Result<()> {
         let (context, input) = (self.context, self.input);
         let env = context.env();
@@ -197,6 +200,8 @@ impl FieldStep<'_> {
     }
 
     /// Places, velocities, drifts and forces of the modes, from the residual `g` of the last state.
+    /// Everything is a product with `N^T`, so that a mode's share of a field costs a row of a
+    /// table.
     fn measure(&mut self, g: &[f32]) -> Result<()> {
         let (context, input) = (self.context, self.input);
         let env = context.env();
@@ -253,6 +258,8 @@ impl FieldStep<'_> {
     }
 
     /// The modes' own velocities and forces in the state being made.
+    /// Inertia is what BDF2 had, with the modes' forced part in the drift; velocities are the
+    /// oscillators' own.
     fn finish_free(&mut self, next: &[f32]) {
         let context = self.context;
         let last = self.input.last;

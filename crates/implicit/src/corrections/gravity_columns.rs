@@ -48,6 +48,7 @@ impl GravityResponse {
                 until: None,
             },
         };
+        // One for each axis: a gravity in any direction is a sum of the three.
         let mut columns = [Vec::new(), Vec::new(), Vec::new()];
         solver.preconditioner.prescribe(env, &[])?;
         solver.preconditioner.expect_load(env, true)?;
@@ -103,6 +104,7 @@ pub(super) fn add_gravity(
     input: &Input<'_>,
     u: &mut [f32],
 ) -> Result<()> {
+    // The change alone: what gravity did before is in the last state.
     let Some(change) = input.load.and_then(|load| load.turned_by()) else {
         return Ok(());
     };
@@ -137,6 +139,7 @@ impl Corrections {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
+    /// Large fields are shared, not copied; copies of nodes are named by their parents.
     pub fn follow_gravity(&self, context: SolverContext<'_>, parents: &[u32]) -> Result<()> {
         if self.gravity.get().is_some() {
             return Ok(());

@@ -8,7 +8,9 @@ use super::solver::ImplicitSolver;
 use crate::error::Result;
 use crate::kernels::parts::Parts;
 
-/// Parts of the second difference of the displacement, and of that of the velocity over a step, by which a step of BDF2 errs.
+/// Parts of the second difference of the displacement, and of that of the velocity over a step, by
+/// which a step of BDF2 errs. Both differences are of known states; their weights scale them to
+/// millimetres of error, and a bundle's calibration follows on top.
 const BEND: f64 = 0.02;
 const JERK: f64 = 0.05;
 
@@ -80,6 +82,9 @@ impl ImplicitSolver {
     }
 
     /// Velocities of a state that the model predicted and nothing corrected.
+    ///
+    /// # Errors
+    /// A panic on another thread of the pool.
     pub fn follow(
         &mut self,
         context: SolverContext<'_>,
@@ -93,6 +98,7 @@ impl ImplicitSolver {
     }
 
     /// The state being made is one that no equation of motion led to: without velocity.
+    /// The pairs go too: they would lead back to what was refused.
     pub fn stop_next(&mut self) {
         self.next.velocity.fill(0.0);
         self.next.velocity_before.fill(0.0);

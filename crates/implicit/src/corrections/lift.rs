@@ -23,11 +23,13 @@ use crate::field::ContactSet;
 use crate::memory;
 
 const WHAT: &str = "the response to a support";
-/// Iterations for each column.
+/// Iterations for each column, made once a model: what they leave unbalanced is in the guess of
+/// every step in which the group moves.
 const ITERATIONS: u32 = 30;
 /// The displacement that is solved for, mm: so little that the elements are linear, so much that rounding is not seen.
 const TRIAL_MM: f32 = 0.02;
-/// A coordinate in which the nodes spread by less than this part of the widest is left out.
+/// A coordinate in which the nodes spread by less than this part of the widest is left out: a group
+/// in a plane has no third coordinate to speak of, and dividing by its rounding would make one up.
 const FLAT: f64 = 1e-3;
 
 impl Group {
@@ -42,6 +44,7 @@ impl Group {
 }
 
 /// `b_j` of nodes at rest.
+/// `[1..=4][n]`: orthogonal, of mean square one.
 fn functions(rest: &[f32], nodes: &[u32]) -> Result<Vec<Vec<f32>>> {
     let mut made: Vec<Vec<f64>> = memory::room(4, WHAT)?;
     made.push(memory::filled(nodes.len(), 1.0, WHAT)?);

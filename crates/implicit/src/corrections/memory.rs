@@ -56,6 +56,8 @@ impl Memory {
     }
 
     /// Back to the pairs of the last published state.
+    /// Lists of slots are exchanged, no vectors: a slot of the published state is never written to
+    /// while it is published.
     pub fn begin(&mut self) {
         self.order.clone_from(&self.published);
     }

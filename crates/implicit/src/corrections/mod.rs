@@ -75,7 +75,9 @@ pub use time_step::{Integrator, TimeStep};
 
 /// The tables and elements of a bundle's corrections.
 pub struct Corrections {
+    /// The modes and their products: the coarse level of the preconditioner.
     pub space: CoarseSpace,
+    /// Elements and masses, in the packing that the kernels read.
     pub body: Body,
     /// The elements that tools do not touch.
     pub far: FarField,
@@ -132,6 +134,8 @@ impl Corrections {
     /// # Errors
     /// [`Error::Bundle`] and [`Error::Io`] for the file, [`Error::OutOfMemory`].
     pub fn prepare_loads(&self, files: &BundleFiles) -> Result<()> {
+        // Two scenes may read the file at once: the first one's tables stand, and the other's are
+        // dropped.
         if self.whole.get().is_some() {
             return Ok(());
         }
@@ -173,6 +177,7 @@ impl Corrections {
     }
 }
 
+/// The tables that corrections cannot do without; the error names the command that makes them.
 fn needed<'a>(
     manifest: &'a Manifest,
     prior: Option<&'a PriorTable>,

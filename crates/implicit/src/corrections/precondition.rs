@@ -217,6 +217,9 @@ impl Preconditioner {
             subtract_gram(env.isa, whitened, count, 1e3, upper);
         });
         if less.is_err() {
+            // Not positive: what the tables and a short step leave out can make the contact's part
+            // larger than the whole. The matrix without contact is positive, and serves as a
+            // preconditioner, too.
             // The contact takes more than there is, by what the tables and a short step leave out: the whole is positive, and does.
             self.galerkin
                 .held

@@ -1,4 +1,9 @@
 //! A step whose contact is prescribed: where the nodes in contact end is known, and the rest of the field follows.
+//!
+//! 1. The guess: the last state and the response of `K + kappa M` that takes the contact to its
+//!    place, in as many parts as keep the elements sound.
+//! 2. Iterations over the whole field with the contact nodes held ([`super::relax`]).
+//! 3. The forces that hold them there, from the residual of the state that stands.
 
 use super::gravity_columns::add_gravity;
 use super::input::{Input, Report, SolverContext};

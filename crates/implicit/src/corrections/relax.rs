@@ -18,9 +18,13 @@ use crate::kernels::vectors::dots;
 ///
 /// The solver's last motion does not change while it is made; `report` adds up what its iterations and evaluations did.
 pub(super) struct FieldStep<'a> {
+    /// Its `fields`, `balance` and pairs are written to; `motion` is read alone.
     pub solver: &'a mut ImplicitSolver,
+    /// Tables and threads.
     pub context: SolverContext<'a>,
+    /// What the step starts from and is asked to do.
     pub input: &'a Input<'a>,
+    /// Of this step so far.
     pub report: Report,
 }
 

@@ -61,6 +61,7 @@ impl Relaxing {
                 }
             },
         );
+        // What is remembered is of the last published state from here on.
         self.since_s = 0.0;
         let failed = failed.into_inner();
         match failed.unwrap_or_else(std::sync::PoisonError::into_inner) {

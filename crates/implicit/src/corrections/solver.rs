@@ -15,9 +15,11 @@ use super::relaxing::Relaxing;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
-/// A state whose smallest det F falls below this is not accepted.
+/// A state whose smallest det F falls below this is not accepted: nearer to zero an element's law
+/// says little, and below zero nothing (docs/decisions/039-sound-states.md).
 pub const SMALLEST_DET: f32 = 0.02;
-/// A load whose guess halves the smallest det F is taken in at most this many parts.
+/// A load whose guess halves the smallest det F is taken in at most this many parts: 1, 2, 4, 8,
+/// 16.
 pub(super) const MOST_PARTS: u32 = 16;
 
 /// A scene's own part.
@@ -27,6 +29,7 @@ pub struct ImplicitSolver {
     pub(super) preconditioner: Preconditioner,
     /// What is out of balance in a state.
     pub(super) balance: Balance,
+    /// Room of the step being made.
     pub(super) fields: Fields,
     /// The pairs of L-BFGS over the whole field: of prescribed contact and free steps.
     pub(super) memory: Memory,
@@ -38,6 +41,7 @@ pub struct ImplicitSolver {
     pub(super) next: Motion,
     /// The natural modes of a free step, in closed form.
     pub(super) free: Oscillators,
+    /// Which support groups are let go; a change makes the pairs those of another boundary.
     pub(super) groups: LetGo,
     /// Of tissue that relaxes.
     pub(super) relaxing: Option<Box<Relaxing>>,
@@ -139,6 +143,7 @@ impl ImplicitSolver {
     }
 
     /// The state being made becomes the last.
+    /// Nothing here allocates or fails: a step that has been made can always be published.
     pub fn commit(&mut self) {
         std::mem::swap(&mut self.motion, &mut self.next);
         self.groups.before = self.groups.now;
@@ -152,6 +157,8 @@ impl ImplicitSolver {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
+    /// It is what a snapshot needs to go on with the same bits: motion, pairs, the course of the
+    /// near sets, and remembered stresses. Factors and layouts follow from these.
     pub fn history(&self, contacts: usize) -> Result<History> {
         let mut motion = self.motion.copy()?;
         // The guard may have dropped the contact that they belonged to.
@@ -189,6 +196,7 @@ impl ImplicitSolver {
             relaxing,
         } = history;
         let corrections = context.corrections;
+        // Checked as a whole before anything of this solver is changed.
         let sizes = [corrections.body.mass.len(), corrections.space.count()];
         local.iter().try_for_each(|record| record.check(sizes))?;
         self.motion.take(motion)?;
@@ -205,6 +213,8 @@ impl ImplicitSolver {
         }
         self.commit_pairs();
         for Pair { step, change } in pairs {
+            // Stored one after another as a scene does, which makes their products anew in the same
+            // order.
             self.memory.store(context.env(), step, 1.0, change)?;
         }
         self.memory.commit();

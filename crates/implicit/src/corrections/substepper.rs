@@ -23,8 +23,10 @@ const LEAST_SWING: u32 = 2;
 /// What a scene has for them.
 #[derive(HeldBytes)]
 pub struct Substepper {
+    /// Shorter steps in one of the scene.
     count: u32,
     #[held(own)]
+    /// Of their length; scenes of a model with the same count share it.
     pub(super) time_step: Arc<TimeStep>,
     /// From here to `motion`: those of shorter steps while whole ones are made, and the other way round; see [`Substepper::exchange`].
     preconditioner: Preconditioner,

@@ -15,7 +15,8 @@ use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
 const WHAT: &str = "the substeps of a scene";
-/// Iterations of a substep at most, after one that has lost the contact.
+/// Iterations of a substep at most, after one that has lost the contact: more of them would lose it
+/// again.
 const ONCE_LOST: u32 = 2;
 
 /// What contact has in them, made at the first.
@@ -27,7 +28,9 @@ pub struct Substeps {
     responses: Delassus,
     /// Contact at the start of the step: it comes back when the parts are done, for the host has seen no other.
     past: Past,
+    /// Where they are in each part.
     tools: ToolsOnTheirWay,
+    /// Where their far ends are in each part.
     ties: TiesOnTheirWay,
 }
 

@@ -32,6 +32,7 @@ impl Integrator {
 /// A step's length with what is made for it.
 #[derive(Debug, HeldBytes)]
 pub struct TimeStep {
+    /// The length and the damping that the blocks are made for.
     pub integrator: Integrator,
     /// Inverse of each node's block of `K + kappa M`, symmetric: xx, xy, xz, yy, yz, zz; mm/µN.
     pub inverse_blocks: Vec<[f32; 6]>,
@@ -56,7 +57,9 @@ impl TimeStep {
 /// Lumped mass `[K]`, g, and the 3x3 diagonal blocks of the stiffness at rest, µN/mm.
 #[derive(HeldBytes)]
 pub struct Diagonal {
+    /// A quarter of each element's mass at each of its corners.
     pub mass: Vec<f64>,
+    /// xx, xy, xz, yy, yz, zz.
     pub(super) blocks: Vec<[f64; 6]>,
 }
 
@@ -76,6 +79,7 @@ impl Diagonal {
             let rest = corners.map(|node| positions[node as usize].map(f64::from));
             let stiffness = f64::from(body.stiffness_of(at));
             let tet = Tetrahedron::new(corners, rest, stiffness);
+            // kg/m³ in g/mm³.
             let density = 1e-6 * body.laws.density_of(at, material.density_kg_m3);
             let share = 0.25 * tet.volume / stiffness * density;
             for (node, block) in corners.into_iter().zip(tet.diagonal_blocks(moduli)) {
@@ -90,6 +94,7 @@ impl Diagonal {
 }
 
 /// Inverse of a symmetric 3x3 block with `shift` on its diagonal.
+/// Zero where the block has none, as at a node of no element: the preconditioner then leaves it.
 pub(super) fn inverse([xx, xy, xz, yy, yz, zz]: [f64; 6], shift: f64) -> [f32; 6] {
     let matrix = nalgebra::Matrix3::new(xx + shift, xy, xz, xy, yy + shift, yz, xz, yz, zz + shift);
     let inverse = matrix

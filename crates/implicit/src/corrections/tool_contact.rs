@@ -59,6 +59,7 @@ const MOST_PARTS: u32 = 4;
 
 /// The state of an iteration.
 struct Iterate<'a> {
+    /// The state `[K,3]`, mm.
     u: &'a mut Vec<f32>,
     /// `F(u)`, µN.
     g: &'a mut Vec<f32>,
@@ -73,6 +74,7 @@ struct ToolStep<'a> {
     solver: &'a mut ImplicitSolver,
     context: SolverContext<'a>,
     input: &'a Input<'a>,
+    /// Tools and ties with their forces: `past` of the last step, `next` of this one.
     problem: &'a mut ContactProblem,
     /// The guess is linear elasticity from rest: falling back to that would make it a second time.
     guessed_from_rest: bool,

@@ -20,9 +20,9 @@ use crate::memory::{self, HeldBytes};
 use crate::prior::{CoarseSpace, LostElements};
 
 const WHAT: &str = "the whole modes of the corrections";
-/// Fields of a pass.
+/// Fields of a pass: a residual is read once for eight of them.
 const AT_ONCE: usize = 8;
-/// Most modes that a file may hold.
+/// Most modes that a file may hold: each is a field of the whole body.
 const LIMIT: usize = 256;
 
 /// The tables of a bundle.

@@ -1,4 +1,8 @@
 //! The far field of a body that has been cut: that of the intact body, made anew in the chunks of which an element has changed.
+//!
+//! Clusters stay those of the intact body, with the same elements or what these have become, so
+//! that their number and laws do not change with a cut. Weights and volumes are summed anew where
+//! an element has changed; the table on the modes has what was lost taken off.
 
 use std::ops::Range;
 
@@ -14,12 +18,16 @@ pub type Corners = (u32, [u32; 4]);
 
 /// The chunks that the elements of one chunk of the intact body are packed in.
 struct Packed<'a> {
+    /// The chunk of the intact body, with the elements that stay.
     first: usize,
+    /// Chunks that cuts have made for the others.
     behind: Range<usize>,
+    /// Of the cut body.
     body: &'a Body,
 }
 
 impl Packed<'_> {
+    /// All of them, in the order in which their sums are made.
     fn chunks(&self) -> impl Iterator<Item = usize> + '_ {
         std::iter::once(self.first).chain(self.behind.clone())
     }
@@ -94,6 +102,7 @@ impl FarField {
             }
             own.borders.end_chunk();
         }
+        // On the modes a cell that is still there moves as its element did.
         for one in &lost.list {
             own.lose(one, lost);
         }

@@ -4,7 +4,8 @@ use super::linear::WHAT;
 use crate::error::Result;
 use crate::memory;
 
-/// Centres lie this far apart at least, mm.
+/// Centres lie this far apart at least, mm: sets are made about them and compared by them, and a
+/// tool that moves by less asks for the same ones.
 const APART_MM: f32 = 3.0;
 
 /// The square of the distance from a node to the nearest of some nodes at rest, mm².
@@ -70,6 +71,7 @@ pub(super) fn reach_of(
 }
 
 /// Adds those nodes that do not lie by one of the centres.
+/// In the order of the list: the same nodes in the same order give the same centres.
 pub(in crate::corrections) fn add_centres(
     rest: &[f32],
     nodes: &[u32],

@@ -61,6 +61,7 @@ impl LeftOut {
     }
 
     /// Puts those of clusters of which the set has no part aside.
+    /// Their lists keep their room for clusters to come.
     fn keep_those_of(&mut self, near: &NearSet) -> Result<()> {
         memory::reserve(&mut self.spare, self.list.len(), WHAT)?;
         let mut parts = near.parts.iter().peekable();
@@ -173,6 +174,7 @@ pub(super) struct Clusters {
 }
 
 impl Clusters {
+    /// For a body of `far`'s clusters; the first [`Clusters::take`] fills the tables.
     pub fn new(far: &FarField, modes: usize) -> Result<Clusters> {
         let count = far.clusters();
         Ok(Clusters {
@@ -243,6 +245,7 @@ impl Clusters {
         }
     }
 
+    /// What the law adds in a cluster where it is now, Pa, and det F of its mean.
     fn added(&self, far: &FarField, cluster: usize) -> ([f64; NINE], f64) {
         let volume = self.volumes[cluster];
         if volume <= 0.0 {

@@ -36,9 +36,13 @@ pub(super) struct NearColumns {
 
 /// What columns are made with.
 pub(super) struct Response<'a> {
+    /// Tables and threads.
     pub env: Env<'a>,
+    /// Whose core the factor is of.
     pub near: &'a NearSet,
+    /// For `G^-1`.
     pub preconditioner: &'a Preconditioner,
+    /// Factor, known columns and room: all are written to while the contact only asks.
     pub own: RefCell<(&'a mut NearFactor, &'a mut NearColumns, &'a mut Room)>,
 }
 

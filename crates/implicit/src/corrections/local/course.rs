@@ -13,11 +13,14 @@ use crate::corrections::extent::LEVELS;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
-/// Another set is made ready where something touched lies farther than this from the centres, mm.
+/// Another set is made ready where something touched lies farther than this from the centres, mm:
+/// early enough that it is whole before the tool has gone [`MOST_MM`].
 const SLACK_MM: f32 = 5.0;
-/// And at once where it lies farther than this.
+/// And at once where it lies farther than this: no step is made in a set that lies beside its
+/// tools.
 const MOST_MM: f32 = 9.0;
-/// A centre is left out that lies this far from all that is touched, mm.
+/// A centre is left out that lies this far from all that is touched, mm: a set that drags its past
+/// along would grow without end.
 const LEFT_MM: f32 = 12.0;
 
 /// Parts of a set, about as long as each other: the elements and what they leave of the far clusters; the factor's pattern, and the factor.
@@ -41,34 +44,41 @@ pub struct Choice {
 /// The set in force, and the one that will follow it.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize, HeldBytes)]
 pub struct Course {
+    /// Which the step iterates in.
     pub(super) now: Choice,
+    /// Which is being made, if its `parts` are not zero.
     pub(super) next: Choice,
 }
 
 /// What a step asks of a near set.
 #[derive(Clone, Copy)]
 pub(super) struct Wanted<'a> {
+    /// `[K,3]`, mm.
     pub rest: &'a [f32],
     /// Nodes that it has to lie about, thinned out and ascending.
     pub about: &'a [u32],
+    /// How far it has to reach, as the last step has found ([`crate::corrections::extent`]).
     pub level: usize,
     /// It is the first of the step: the next set may go on.
     pub is_due: bool,
 }
 
 impl Choice {
+    /// There is no such set.
     fn clear(&mut self) {
         self.parts = 0;
         self.centres.clear();
         self.tangent.clear();
     }
 
+    /// Without allocating, after [`Choice::fit`].
     fn take(&mut self, other: &Choice) {
         (self.parts, self.asked, self.level) = (other.parts, other.asked, other.level);
         self.centres.clone_from(&other.centres);
         self.tangent.take(&other.tangent);
     }
 
+    /// Room for another's lists.
     fn fit(&mut self, other: &Choice) -> Result<()> {
         memory::fit(&mut self.centres, other.centres.len(), WHAT)?;
         self.tangent.fit(&other.tangent)

@@ -22,9 +22,11 @@ use crate::memory::{self, HeldBytes};
 
 /// An entry that an element does not have: its row is not of the core.
 const NONE: u32 = u32::MAX;
-/// An element is taken at rest where its det F is less.
+/// An element is taken at rest where its det F is less: its tangent would be that of a law at the
+/// edge of what it describes, and the factor serves states on both sides of it.
 const LEAST_DET: f64 = 0.2;
-/// The tangent is taken anew where an entry of F has changed by more than this since.
+/// The tangent is taken anew where an entry of F has changed by more than this since: a factor is
+/// dear, and the pairs make up for a tangent that is a little old.
 const MOST_CHANGE: f32 = 0.2;
 /// What is factored until it is positive: the tangent, or the stiffness at rest, with so much of its diagonal added. A tangent need not be
 /// positive, and what rounding makes of a nearly incompressible body with slivers neither.
@@ -45,6 +47,7 @@ pub(in crate::corrections) struct NearFactor {
     rows: BlockRows,
     /// Of each element with a corner in the core: which of the near ones it is, and the blocks of its corners.
     targets: Vec<(u32, [u32; 16])>,
+    /// `U` of the core's rows and columns.
     factor: SparseFactor,
     /// Where the core's nodes are at rest.
     points: Vec<[f32; 3]>,
@@ -58,6 +61,7 @@ pub(in crate::corrections) struct NearFactor {
 
 impl NearFactor {
     /// Takes the pattern of another near set.
+    /// The pattern depends on which nodes are near and on nothing else, so it is made once a set.
     pub fn plan(&mut self, near: &NearSet, rest: &[f32]) -> Result<()> {
         let (elements, core) = (&near.elements, near.places.core);
         self.factor.forget();
@@ -219,6 +223,8 @@ impl NearFactor {
         changes.fold(0.0, f32::max)
     }
 
+    /// The entries of the core's rows: the elements' stiffness at the state or at rest, inertia,
+    /// and so much more of the diagonal.
     fn assemble(
         &mut self,
         (env, near, far): (Env<'_>, &NearSet, &FarField),

@@ -1,4 +1,9 @@
 //! The near elements in linear elasticity, and what of the far field's clusters they are.
+//!
+//! The iterations know the near elements in two ways: by their law ([`super::near`]), and linearly
+//! about rest. The linear part is what the modes' Gram matrix has of them already, so it is what a
+//! near set takes off; and it stands for the change of a pair at nodes that were far when the pair
+//! was made.
 
 use std::ops::Range;
 
@@ -14,6 +19,7 @@ pub(super) const WHAT: &str = "the elements near the tools";
 /// One element.
 #[derive(HeldBytes)]
 struct Linear {
+    /// Of the corners in the near set.
     places: [u32; 4],
     /// The cluster of the far field that it would be of.
     cluster: u32,
@@ -27,12 +33,14 @@ struct Linear {
 /// The elements; see [`super::near`] for what a place is.
 #[derive(Default, HeldBytes)]
 pub(super) struct LinearElements {
+    /// In the order in which the near set found them; an element is known by its place here.
     all: Vec<Linear>,
     /// Directions of fibres at rest, as far as the last element that has one.
     fibres: Vec<[f64; 3]>,
 }
 
 impl LinearElements {
+    /// The room stays for the next set.
     pub fn clear(&mut self) {
         self.all.clear();
         self.fibres.clear();
@@ -154,6 +162,7 @@ fn apply<'a>(elements: impl Iterator<Item = &'a Linear>, v: &[f32], out: &mut [f
                 }
             }
         }
+        // `sigma = lambda tr H + mu (H + H^T)`, times the volume.
         let pressure = element.lambda * (h[0][0] + h[1][1] + h[2][2]);
         let mut stress = [[0.0f32; 3]; 3];
         for i in 0..3 {
@@ -192,6 +201,7 @@ pub(super) struct Parts {
     list: Vec<Part>,
     /// `sum_e v_e grad N` of their free nodes, a place each, mm²; those of a part in the order of the mesh's nodes, which does not depend on what else is near.
     weights: Vec<(u32, [f32; 3])>,
+    /// By place, of the part at hand; zeros between two parts.
     sums: Vec<[f32; 3]>,
     /// Places that a sum has been added to, a bit each.
     summed: Vec<u64>,

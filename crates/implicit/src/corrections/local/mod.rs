@@ -59,9 +59,12 @@ const LOOKED_AT_DET: f32 = 0.5;
 
 /// What a solver lends to the iterations of a step.
 pub(super) struct StepContext<'a> {
+    /// Tables and threads.
     pub context: SolverContext<'a>,
     pub input: &'a Input<'a>,
+    /// For its coarse level; `coordinates` are written over.
     pub preconditioner: &'a mut Preconditioner,
+    /// Of the last evaluation of all elements: its smallest det F by chunk.
     pub scratch: &'a mut Scratch,
     /// What BDF2 takes from the past `[K,3]`, µN.
     pub drift: &'a [f32],
@@ -70,22 +73,28 @@ pub(super) struct StepContext<'a> {
 /// A state whose residual is known at every node.
 #[derive(Clone, Copy)]
 pub(super) struct Base<'a> {
+    /// `[K,3]`, mm.
     pub u: &'a [f32],
+    /// `F(u) [K,3]`, µN, without the tools' loads.
     pub residual: &'a [f32],
 }
 
 /// A scene's own part.
 #[derive(HeldBytes)]
 pub struct LocalSolver {
+    /// What is near in this step, with its factor.
     pub(super) set: Set,
+    /// Which set that is, and the next one, made a part a step.
     pub(super) coming: Coming,
     pub(super) pairs: Pairs,
+    /// The law's part of the far elements, by their means.
     clusters: Clusters,
     pub(super) reach: Reach,
     /// Since the base.
     now: Moved,
     /// The direction.
     d: Moved,
+    /// Of the state that stands and of the one tried.
     residuals: Residuals,
     pub(super) measured: Measured,
     spare: Spare,

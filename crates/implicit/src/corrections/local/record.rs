@@ -36,6 +36,7 @@ pub struct Record {
 
 impl Record {
     /// Checks what was read.
+    /// Against the numbers of nodes and modes of a body.
     pub fn check(&self, [nodes, modes]: [usize; 2]) -> Result<()> {
         let inside = |list: &[u32]| list.iter().all(|&node| (node as usize) < nodes);
         let sound = inside(&self.about)
@@ -60,6 +61,8 @@ impl Record {
 }
 
 impl Record {
+    /// Copies another into the room that there is. In the order of the fields: what fails half way
+    /// is in no list yet.
     pub(super) fn take(&mut self, other: &Record) -> Result<()> {
         memory::replace(&mut self.about, &other.about, WHAT)?;
         memory::replace(&mut self.centres, &other.centres, WHAT)?;
@@ -70,6 +73,7 @@ impl Record {
         memory::replace(&mut self.p, &other.p, WHAT)
     }
 
+    /// Takes a pair in the places of a near set: only inside nodes have a `t` and an `r`.
     pub(super) fn fill(
         &mut self,
         near: &NearSet,

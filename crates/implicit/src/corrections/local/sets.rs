@@ -14,8 +14,11 @@ use crate::memory::{self, HeldBytes};
 /// A near set with what follows from its centres alone, and the factor of its tangent.
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct Set {
+    /// Nodes, elements and blocks about the centres.
     pub near: NearSet,
+    /// What it leaves of the far clusters that it has a part of.
     pub(super) left: LeftOut,
+    /// Of the tangent in its core; its pattern is the second part of a set.
     pub factor: NearFactor,
 }
 

@@ -17,6 +17,7 @@ use crate::memory::{self, HeldBytes};
 /// A move of the near nodes, and what is linear in it: since the base, or of a direction.
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct Moved {
+    /// `t` and `c`.
     pub step: Step,
     /// `Phi c` at the near nodes `[.., 3]`, by place, mm.
     pub modes: Vec<f32>,
@@ -50,7 +51,7 @@ impl Moved {
 /// The residual of the state that stands, of the next one, and of the base.
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct Residuals {
-    /// Of the state that stands, less that of the base at the modes.
+    /// Of the state that stands: at the inside nodes, and `Phi^T` of it at all nodes.
     pub residual: Change,
     /// Of the next state.
     pub next: Change,
@@ -141,11 +142,13 @@ impl Reach {
 #[derive(HeldBytes)]
 pub(in crate::corrections) struct Spare {
     pub room: Room,
+    /// What contact has asked of the factor so far.
     pub(super) columns: NearColumns,
     /// Amplitudes of the modes `[r]`.
     pub on_modes: Vec<f32>,
     pub more_on_modes: Vec<f32>,
     pub solved: Vec<f32>,
+    /// Sums of the pieces of a pass.
     pub partial: PartialSums,
     /// What the last contact solve has changed, by degrees of freedom of the prior, mN.
     pub loads: Vec<(u32, f32)>,

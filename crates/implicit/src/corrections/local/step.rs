@@ -10,6 +10,7 @@ use crate::memory::{self, HeldBytes};
 pub(in crate::corrections) struct Step {
     /// `[3 S]`, mm.
     pub t: Vec<f32>,
+    /// Amplitudes of the modes `[r]`, mm.
     pub c: Vec<f32>,
 }
 

@@ -1,4 +1,8 @@
 //! The coarse level of steps under loads, with the bundle's whole modes ([`crate::corrections::whole`]).
+//!
+//! Gravity or pressure moves the whole body, and the prior's block bases, which are made of
+//! responses to contact, cannot show that. With whole modes the coarse level spans both; without a
+//! load they are left out, since each costs a pass over all nodes.
 
 use super::parts::WholeLevel;
 use super::{Env, Preconditioner, WHAT, mask_held};
@@ -10,7 +14,8 @@ use crate::kernels::respond::accumulate_rows;
 use crate::kernels::rows::{RowPlan, decode_rows};
 use crate::memory;
 
-/// One of so many nodes says how far whole modes move.
+/// One of so many nodes says how far whole modes move: an estimate of the largest move, by which it
+/// is decided whether all elements have to be asked.
 const SAMPLED: usize = 16;
 
 impl<'a> Env<'a> {

@@ -1,4 +1,8 @@
 //! The coarse level on modes alone, without a field: what local iterations ask of the preconditioner.
+//!
+//! Local iterations carry the far field as amplitudes of the modes. What they need of the
+//! preconditioner then are products with small dense matrices, `[r,r]`, and with the rows of the
+//! modes in the blocks near the tools.
 
 use std::ops::Range;
 
@@ -10,6 +14,7 @@ use crate::kernels::rows::Stored;
 
 impl Preconditioner {
     /// `out = G^-1 load` with `G = Phi^T (K + kappa M) Phi`: what the modes have of the response to loads on them, mm.
+    /// By the inverse and not a factor: a product reads it once and in order.
     pub fn respond_on_modes(&self, env: Env<'_>, load: &[f32], out: &mut [f32]) -> Result<()> {
         let inverse = Stored::F32(&self.galerkin.inverse);
         Ok(row_dots(
@@ -23,6 +28,7 @@ impl Preconditioner {
     }
 
     /// `out = G c`, µN.
+    /// `out [r]`, of amplitudes `c [r]`, mm.
     pub fn stiffen(&self, env: Env<'_>, c: &[f32], out: &mut [f32]) -> Result<()> {
         let galerkin = Stored::F32(&self.galerkin.narrow);
         Ok(row_dots(
@@ -36,6 +42,7 @@ impl Preconditioner {
     }
 
     /// The block coordinates of `Phi c`, as `coordinates`.
+    /// At all nodes; [`Env::near_coordinates`] is the part near the tools.
     pub fn take_coordinates(&mut self, env: Env<'_>, c: &[f32]) -> Result<()> {
         let (modes, rows) = (env.space.modes(), env.space.rows());
         let (isa, pool, q) = (env.isa, env.pool, &mut self.coordinates);
@@ -45,6 +52,7 @@ impl Preconditioner {
 
 impl Env<'_> {
     /// `out = Phi^T E f`, µN, of forces on degrees of freedom with columns, mN.
+    /// The factor 1e3 takes mN to µN.
     pub fn work_of_modes(&self, forces: &[(u32, f32)], out: &mut [f32]) {
         out.fill(0.0);
         for &(dof, force) in forces {
@@ -67,6 +75,7 @@ impl Env<'_> {
     }
 
     /// The same for `n` lists of coordinates `[n,Q]` that are zero outside of some ranges, to `out [n,r]`.
+    /// Each row of the modes is read once for three of the lists.
     pub fn on_modes_in(&self, ranges: &[Range<usize>], q: &[f32], out: &mut [f32]) {
         let (modes, rows) = (self.space.modes(), self.space.rows());
         row_dots_in(self.isa, modes, rows, ranges, q, out);

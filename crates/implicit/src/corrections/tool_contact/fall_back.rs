@@ -1,5 +1,8 @@
 //! What takes the place of a step that lost the contact or inverted elements: its first guess, linear elasticity from rest, or the state before it
 //! (`docs/decisions/018-swept-contact.md`).
+//!
+//! `fields.guess` and the problem's kept forces belong together here: whatever is written to one is
+//! written to the other, so that the state that is taken in the end has the forces that it had.
 
 use super::{Iterate, SUNK_MM, ToolStep, lost_by};
 use crate::corrections::lift::lift;

@@ -8,7 +8,8 @@ use crate::corrections::lift::lift;
 use crate::corrections::solver::SMALLEST_DET;
 use crate::error::Result;
 
-/// How often the way from rest to a guess is halved until its end has no inverted element.
+/// How often the way from rest to a guess is halved until its end has no inverted element: the last
+/// of them leaves 0.4 % of the way.
 const HALVES: u32 = 8;
 /// Smallest det F of a state from rest that iterations begin with: one at the limit leaves them no way.
 const BEGUN_DET: f32 = 0.2;

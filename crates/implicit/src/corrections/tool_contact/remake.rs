@@ -9,7 +9,8 @@ use crate::error::Result;
 /// Where broad tools stop that thrust farther than the step can follow, in half thicknesses from where they were.
 const STOPS: [f32; 2] = [0.8, 0.0];
 
-/// How often a step is made again because ties break; what is pulled too hard then breaks in the next.
+/// How often a step is made again because ties break; what is pulled too hard then breaks in the
+/// next. It bounds the work of a step in which a whole seam rips.
 const MOST_BREAKS: u32 = 6;
 
 /// Makes the step from `input.last` that the tools of `problem` cause, and tells them what they feel; from the pairs of the last published state, or

@@ -16,7 +16,8 @@ const KEPT_THIN_MM: f32 = 0.28 * SUNK_MM;
 const KEPT_THIN_SHORT_MM: f32 = 1.12 * KEPT_THIN_MM;
 /// A part of a direction is short below this.
 const SHORT: f32 = 0.25;
-/// Iterations from one base at most: the far field is that of the base, in all but its clusters.
+/// Iterations from one base at most: the far field is that of the base, in all but its clusters,
+/// and falls behind as the modes move.
 const ROUND: u32 = 16;
 
 /// Whole modes may move the tissue so far after the iterations without an evaluation of what that leaves, mm.
@@ -68,6 +69,7 @@ impl ToolStep<'_> {
             }
             self.evaluate(at)?;
         }
+        // What the far elements really have is asked of them where the means may hide it.
         let far_moved_mm = self
             .solver
             .local
@@ -177,6 +179,7 @@ impl ToolStep<'_> {
     }
 
     /// The state of the iterations into `at`, whose residual is not known then.
+    /// `at.g` is that of the base still: whoever needs the residual evaluates.
     pub(super) fn end_round(&mut self, at: &mut Iterate<'_>) -> Result<()> {
         // What loads do far from the tools is not in the span of the iterations. What has been let go has moved before them, and is near.
         let is_loaded = self.input.load.is_some() && self.context.held.let_go == 0;

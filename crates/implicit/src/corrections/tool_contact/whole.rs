@@ -1,4 +1,7 @@
 //! Modes of the whole body, and of what a support group held, in a step that tools drive.
+//!
+//! Local iterations span neither. So they move once a round, after the iterations, by what the
+//! residual of the base, less the tools' loads, has of them.
 
 use super::thrown::take_loads;
 use super::{Iterate, ToolStep};
