@@ -11,6 +11,7 @@ use crate::stats::flag;
 
 /// Rounding that is no violation, relative.
 const SLACK: f32 = 1.0 + 1e-4;
+/// A node in no patch.
 const NO_PATCH: u32 = u32::MAX;
 
 /// What a check found.
@@ -82,6 +83,7 @@ impl EnvelopeCheck {
     ///
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
+    /// Copies of nodes have no neighbours of their own: a patch ends at a lip.
     pub fn cut(&self, mesh: &Mesh, intact: usize) -> Result<EnvelopeCheck> {
         const WHAT: &str = "the surface's edges";
         let count = mesh.node_count();

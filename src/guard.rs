@@ -15,10 +15,12 @@ use crate::stats::flag;
 /// Flags that make the guard refuse a state.
 pub const REFUSED: u32 = flag::BOUND | flag::NON_FINITE | flag::INVERTED | flag::GROWTH;
 
-/// A step may enlarge the largest displacement, or overshoot the largest imposed one, by this factor ...
+/// A step may enlarge the largest displacement, or overshoot the largest imposed one, by this
+/// factor ...
 const GROWTH_FACTOR: f32 = 1.6;
-/// ... and by this much, mm.
+/// ... and by this much, mm: a body at rest has no size to grow from.
 const GROWTH_FLOOR: f32 = 2.0;
+/// Elements of a chunk of work.
 const CHUNK: usize = 4096;
 
 /// Flags of a state whose largest displacement is `max_now` after one of `max_before`, with `max_push` imposed.
@@ -55,6 +57,7 @@ pub fn inverted(pool: &Pool, positions: &[f32], field: &[f32], tets: &[u32]) -> 
                 }
             }
             if volume(&corners, &[0, 1, 2, 3]) <= 0.0 {
+                // Which thread finds it does not matter: the answer is one bit.
                 found.store(true, Ordering::Relaxed);
             }
         }

@@ -24,6 +24,7 @@ pub(super) fn call(
     on_panic: impl FnOnce(),
     body: impl FnOnce() -> Answer,
 ) -> upt_status {
+    // A host that traps floating-point exceptions must not die of an inexact product in here.
     let _mode = MaskExceptions::enter();
     let _host = log::HostCall::enter();
     let body = || misplaced().map_or_else(body, |why| fail(UPT_ERR_STATE, why));

@@ -11,6 +11,7 @@ use crate::options::{
     Provider, SceneOptions, StepPath, UserStream,
 };
 
+/// A number that none of an enum's is: of a newer header, or never set.
 pub(super) fn unknown<T>(field: &str, value: i32) -> Result<T, Failure> {
     fail(
         UPT_ERR_ARGUMENT,
@@ -18,6 +19,7 @@ pub(super) fn unknown<T>(field: &str, value: i32) -> Result<T, Failure> {
     )
 }
 
+/// Of a list in the order of preference.
 fn provider(value: i32) -> Result<Provider, Failure> {
     Ok(match value {
         UPT_PROVIDER_CPU => Provider::Cpu,
@@ -138,6 +140,7 @@ pub(super) fn rotation(raw: [f32; 4]) -> [f32; 4] {
     }
 }
 
+/// A byte that must be 0 or 1: any other is one that was never set.
 pub(super) fn flag(field: &str, value: u8) -> Result<bool, Failure> {
     match value {
         0 => Ok(false),
@@ -161,6 +164,7 @@ pub(super) fn switch(field: &str, value: upt_switch) -> Result<bool, Failure> {
     }
 }
 
+/// Zero, so that a later version may give them a meaning.
 pub(super) fn reserved(bytes: &[u8]) -> Result<(), Failure> {
     match bytes.iter().all(|&byte| byte == 0) {
         true => Ok(()),
@@ -187,6 +191,8 @@ fn threads(value: u32) -> Result<usize, Failure> {
     }
 }
 
+/// # Safety
+/// As the header says of the struct: pointers are NULL or valid.
 pub(super) unsafe fn init_options(raw: &upt_init_options) -> Result<InitOptions, Failure> {
     Ok(InitOptions {
         threads: threads(raw.threads)?,
@@ -195,6 +201,8 @@ pub(super) unsafe fn init_options(raw: &upt_init_options) -> Result<InitOptions,
     })
 }
 
+/// # Safety
+/// As the header says of the struct: pointers are NULL or valid.
 pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptions, Failure> {
     if raw.provider_count > MOST_PROVIDERS {
         return fail(
@@ -228,6 +236,7 @@ pub(super) unsafe fn model_options(raw: &upt_model_options) -> Result<ModelOptio
     })
 }
 
+/// A struct whose fields fit together: what would be left out silently is refused.
 fn corrections(raw: &upt_corrections) -> Result<Corrections, Failure> {
     let upt_corrections {
         mode,

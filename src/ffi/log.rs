@@ -25,6 +25,7 @@ use super::failure::{Answer, fail};
 use super::structs::upt_log_fn;
 use super::trace;
 
+/// The host's function with the pointer that it wants back.
 struct Receiver {
     callback: upt_log_fn,
     user: *mut c_void,
@@ -40,15 +41,20 @@ static RECEIVER: RwLock<Receiver> = RwLock::new(Receiver {
     callback: None,
     user: std::ptr::null_mut(),
 });
+/// The most verbose level that is told; off without a receiver.
 static LEVEL: AtomicI32 = AtomicI32::new(UPT_LOG_OFF);
+/// 1 where the process's subscriber is [`Forward`]; nothing takes it back.
 static INSTALLED: AtomicI32 = AtomicI32::new(0);
 static INSTALL: Once = Once::new();
+/// Open spans by number. One may be closed on another thread than it was opened on.
 static SPANS: LazyLock<Mutex<HashMap<u64, OpenSpan>>> = LazyLock::new(Default::default);
 static NEXT_SPAN: AtomicU64 = AtomicU64::new(1);
 
 /// Messages of threads that are not the host's; the oldest make room.
 static WAITING: Mutex<VecDeque<(i32, String)>> = Mutex::new(VecDeque::new());
+/// Spares each call the lock where nothing waits, which is nearly always.
 static ANY_WAITING: AtomicBool = AtomicBool::new(false);
+/// A host that never calls again must not make them pile up.
 const WAITING_LIMIT: usize = 1024;
 
 thread_local! {
@@ -88,6 +94,7 @@ pub(super) fn in_receiver() -> bool {
     IN_RECEIVER.try_with(Cell::get).unwrap_or(false)
 }
 
+/// Empties the queue.
 fn take_waiting() -> VecDeque<(i32, String)> {
     let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
     ANY_WAITING.store(false, Ordering::Release);
@@ -122,6 +129,7 @@ fn install() -> bool {
     INSTALLED.load(Ordering::Acquire) != 0
 }
 
+/// A span that has begun and not ended.
 struct OpenSpan {
     name: &'static str,
     text: String,
@@ -130,6 +138,7 @@ struct OpenSpan {
     references: usize,
 }
 
+/// The host's receiver from now on. It returns once no call of the former one runs any more.
 pub(super) fn set(callback: upt_log_fn, user: *mut c_void, level: i32) -> Answer {
     if callback.is_some() && level != UPT_LOG_OFF && !install() {
         return fail(
@@ -155,6 +164,7 @@ pub(super) fn set(callback: upt_log_fn, user: *mut c_void, level: i32) -> Answer
     Ok(UPT_OK)
 }
 
+/// To the receiver at once in the host's own call, else into the queue.
 fn emit(level: i32, text: String) {
     if DEPTH.try_with(Cell::get).unwrap_or(0) > 0 && !in_receiver() {
         return hand_over(level, text);
@@ -167,6 +177,8 @@ fn emit(level: i32, text: String) {
     ANY_WAITING.store(true, Ordering::Release);
 }
 
+/// Calls the receiver. A reader's lock is held meanwhile, and [`in_receiver`] keeps it from calling
+/// back into the library.
 fn hand_over(level: i32, text: String) {
     let receiver = RECEIVER.read().unwrap_or_else(PoisonError::into_inner);
     if let (Some(callback), Ok(text)) = (receiver.callback, CString::new(text.replace('\0', " "))) {
@@ -177,6 +189,7 @@ fn hand_over(level: i32, text: String) {
     }
 }
 
+/// The header's number of a level.
 fn level_of(metadata: &Metadata<'_>) -> i32 {
     match *metadata.level() {
         Level::ERROR => UPT_LOG_ERROR,
@@ -214,6 +227,7 @@ const TOLD: [&str; 13] = [
     "kernels", "lanes", "prior", "topology",
 ];
 
+/// The subscriber: it keeps nothing but open spans.
 struct Forward;
 
 impl Subscriber for Forward {

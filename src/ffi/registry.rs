@@ -26,15 +26,20 @@ const HAND_TAG: usize = 4;
 
 /// The next number, without its tag: it only grows, so that a handle that was closed is never met again.
 static NEXT: AtomicUsize = AtomicUsize::new(STRIDE);
+/// Scenes hold their model, too: closing one only takes its number away.
 static MODELS: Live<Model> = Live::new(MODEL_TAG, "model");
+/// Bodies of hulls; a tool that was made of one keeps its own reference.
 static HULLS: Live<::contact::Body> = Live::new(HULL_TAG, "hull");
 /// Names the kind only: `hands` finds these without a lock.
 static HANDS: Live<()> = Live::new(HAND_TAG, "haptics");
+/// Destroyed only while no call is in one.
 static SCENES: Live<SceneEntry> = Live::new(SCENE_TAG, "scene");
 
 /// A scene and whether a bug was caught in it.
 pub(super) struct SceneEntry {
+    /// What the handle stands for.
     pub scene: Scene,
+    /// Set by a panic, and never taken back: what the scene holds may be half changed.
     pub poisoned: AtomicBool,
 }
 
@@ -56,6 +61,7 @@ impl<T> Live<T> {
         }
     }
 
+    /// Gives it a new number.
     fn insert(&self, value: Arc<T>) -> usize {
         let handle = NEXT.fetch_add(STRIDE, Ordering::Relaxed) + self.tag;
         let mut entries = self.entries.write().unwrap_or_else(PoisonError::into_inner);
@@ -63,6 +69,7 @@ impl<T> Live<T> {
         handle
     }
 
+    /// The object, kept alive for as long as the call holds it.
     fn get(&self, handle: usize) -> Result<Arc<T>, Failure> {
         let entries = self.entries.read().unwrap_or_else(PoisonError::into_inner);
         match entries.get(&handle) {
@@ -89,6 +96,7 @@ impl<T> Live<T> {
         }
     }
 
+    /// Why a number is no live handle of this kind: the message says what it is, if that is known.
     fn refuse<U>(&self, handle: usize) -> Result<U, Failure> {
         if handle == 0 {
             return fail(UPT_ERR_NULL, format!("{} is NULL", self.kind));

@@ -14,23 +14,30 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use crate::clock::Instant;
 
 const VARIABLE: &str = "UPT_TRACE";
-/// Bytes of events that wait at most.
+/// Bytes of events that wait at most: a write for each span would cost more than the span.
 const WAITING: usize = 1 << 16;
 
+/// None in it where no trace was asked for, or its file cannot be written.
 static TRACE: OnceLock<Option<Trace>> = OnceLock::new();
+/// Threads are numbered as they appear; their own numbers differ between systems.
 static NEXT_THREAD: AtomicU64 = AtomicU64::new(1);
 
 thread_local! {
+    /// 0 before the first span.
     static THREAD: Cell<u64> = const { Cell::new(0) };
 }
 
 struct Trace {
+    /// Zero of the times in the file.
     start: Instant,
+    /// Spans end on any thread.
     sink: Mutex<Sink>,
 }
 
 struct Sink {
+    /// Always a complete array: it ends in `\n]`, over which the next events are written.
     file: File,
+    /// Events that are not in the file yet, each with its comma.
     waiting: String,
     /// Events are in the file already.
     begun: bool,

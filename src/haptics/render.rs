@@ -17,9 +17,9 @@ use crate::error::{Error, Result};
 use crate::field::INPUT_LIMIT;
 use crate::kernels::FlushToZero;
 
-/// Time between calls that is taken at most, s.
+/// Time between calls that is taken at most, s: a longer pause counts as this.
 const MOST_S: f64 = 0.1;
-/// The time of the first call, s.
+/// The time of the first call, s: a hand's usual period.
 const FIRST_S: f64 = 0.001;
 /// Time between calls over which samples follow forces at least, s: in none they would be rigid.
 const LEAST_S: f64 = 1e-4;
@@ -30,18 +30,22 @@ const MOST_PARTS: u32 = 8;
 
 /// A tool that a hand feels. Used from one thread, which waits for nothing: no lock, no allocation.
 pub struct Haptics {
+    /// Its shape and friction as the host gave them; the pose comes with each call.
     tool: Felt,
     /// Largest force, mN; 0 for none. The torque is scaled with it.
     force_limit_mn: f32,
     /// The contact near the tool in the last published step, and the way back: where the hand is now.
     snapshot: Reader<ContactSnapshot>,
     pose: Writer<Pose>,
+    /// Which of the two ends is gone.
     ends: Arc<Ends>,
     /// Time and pose of the last call.
     last: Option<(f64, Pose)>,
+    /// What the last call has read of the scene.
     seen: Seen,
     blend: Blend,
     damper: Damper,
+    /// The tissue between two steps.
     contact: Solver,
 }
 
@@ -132,11 +136,13 @@ impl Haptics {
                 "the scene was destroyed, so there is no force; destroy this object too".into(),
             ));
         }
+        // A leap is no motion: nothing between the two places was touched.
         let put = self.tool.body.motion(&from, &now) > PUT_MM;
         let from = if put { now } else { from };
         let passed = at.time_s - last_s;
         let seconds = passed.min(MOST_S);
         self.last = Some((at.time_s, now));
+        // The scene publishes what lies about this pose at its next step.
         self.pose.write(now);
         self.damper.observer.observe(&from, &now);
 

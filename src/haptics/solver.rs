@@ -12,7 +12,8 @@ use crate::error::Result;
 use crate::memory;
 
 const WHAT: &str = "haptics";
-/// Samples in one solve at most; those that push come first.
+/// Samples in one solve at most; those that push come first: the solve has a millisecond, and its
+/// matrix `[192,192]` then has 147 kB.
 const MOST_ROWS: usize = 64;
 /// Samples this near to the tool are solved for, and farther by its motion, mm.
 const SKIN_MM: f32 = 0.5;
@@ -20,7 +21,8 @@ const SKIN_MM: f32 = 0.5;
 pub const FADE_MM: f32 = 0.5;
 /// A tool that has gone so far sideways since the step is at other tissue, mm: two samples' spacing.
 const SLIDES_MM: f32 = 3.4;
-/// Of a solve that goes on from the one a millisecond before.
+/// Of a solve that goes on from the one a millisecond before: few sweeps bring it to balance, and a
+/// bounded number of them keeps the time.
 const LIMITS: Limits = Limits {
     tolerance_mm: 1e-4,
     least_sweeps: 4,
@@ -30,13 +32,17 @@ const LIMITS: Limits = Limits {
 
 /// The samples between two steps.
 pub struct Solver {
+    /// How the natural modes go on between two steps.
     pub modes: Modes,
     /// How long support groups have carried the samples since the step, s.
     carried_s: f64,
+    /// Where samples are and what pushes them.
     samples: Pushed,
     /// What they were before a solve, to which one that loses the tool goes back.
     before: Pushed,
+    /// Of the last solve; the stiffness reads it.
     problem: Problem,
+    /// Room for the stiffness that the tool feels.
     stiffness: Stiffness,
     /// Distance to the nearest sample, mm.
     pub nearest: f32,
@@ -48,9 +54,13 @@ pub struct Solver {
 struct Problem {
     /// Its samples by their distance, their contacts and forces, and `W` among them.
     rows: Vec<(f32, usize)>,
+    /// By row: the law there, and gap and slip without the change of forces.
     contacts: Vec<Contact>,
+    /// By row: the force on the sample, mN, from which the sweeps start and in which they end.
     solved: Vec<Vector>,
+    /// `[3n,3n]`, mm/mN, row-major.
     w: Vec<f32>,
+    /// Room of the sweeps.
     sweeps: Sweeps,
 }
 
@@ -297,6 +307,8 @@ impl Solver {
         [force, torque]
     }
 
+    /// How the wrench changes with the tool's pose `[6,6]`, see [`super::stiffness`]: sticking
+    /// samples push in three directions, sliding ones along the normal alone.
     pub fn stiffness(&mut self, snapshot: &ContactSnapshot, about: Vector) -> [f32; 36] {
         self.stiffness.directions.clear();
         for (&(_, at), contact) in self.problem.rows.iter().zip(&self.problem.contacts) {

@@ -142,6 +142,8 @@ impl ReducedEngine {
     }
 
     /// Computes `next` from `last`, `before`, the contact and, where given, the host's displacement `[K,3]`.
+    /// In order: the linear response to the contact, the network, the bound on its correction, and
+    /// the sum of both. Nothing of `last` changes before [`ReducedEngine::commit`].
     pub fn predict(
         &mut self,
         compute: Compute<'_>,
@@ -215,6 +217,8 @@ impl ReducedEngine {
         let next = &mut self.next;
         next.b.copy_from_slice(own.stage.output(0));
 
+        // The correction may not grow by itself: it decays from where it was, and only a new
+        // contact or the response to it gives it room.
         let energy = if given.is_some() {
             norm(b_now)
         } else {
@@ -233,6 +237,7 @@ impl ReducedEngine {
             scale = next.bound / size;
             stats.flags |= flag::CLAMPED;
         }
+        // The correction fades out beyond the pushes that the network was trained on.
         let fade = &map.entry.fade;
         let push = contact.max_push();
         scale *=
@@ -288,6 +293,7 @@ impl ReducedEngine {
     }
 
     /// `next` becomes `last`.
+    /// Records change places; what `next` then holds does not count.
     pub fn commit(&mut self) {
         std::mem::swap(&mut self.before, &mut self.last);
         std::mem::swap(&mut self.last, &mut self.next);

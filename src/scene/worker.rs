@@ -48,6 +48,7 @@ struct Slot {
 /// A copy of the host's input.
 #[derive(Default)]
 struct Copied {
+    /// Which of the lists below count.
     drive: Drive,
     nodes: Vec<u32>,
     /// `[m,3]`, mm.
@@ -56,6 +57,7 @@ struct Copied {
     /// Whether the step starts from `displacement [K,3]`, mm.
     starts: bool,
     displacement: Vec<f32>,
+    /// Gravity, forces and pressures, likewise copied.
     loads: CopiedLoads,
     time_s: f64,
 }

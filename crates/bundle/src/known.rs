@@ -176,12 +176,14 @@ const KEYS: &[(&str, &[&str])] = &[
 /// Keys of an entry of `files`.
 const FILE_KEYS: &[&str] = &["bytes", "sha256"];
 
+/// What a bundle of a later library, or a misspelt key, is answered with.
 fn newer(field: &str) -> Error {
     Error::Version(format!(
         "{FILE}: `{field}` is unknown here: the bundle needs a newer libupt, or the name is misspelt"
     ))
 }
 
+/// Refuses an object with other keys than these.
 fn only(object: &Value, path: &str, keys: &[&str]) -> Result<()> {
     let Some(object) = object.as_object() else {
         return Ok(()); // Another type is told of by its reader.

@@ -10,11 +10,13 @@ use field::error::{Error, Result};
 const VERSION: u64 = 1;
 
 #[derive(Deserialize)]
+/// Read first, so that a bundle of another format is refused by these and not by a missing field.
 struct Header {
     format: String,
     version: u64,
 }
 
+/// Errors name the path of the field.
 fn parse<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T> {
     let mut deserializer = serde_json::Deserializer::from_slice(bytes);
     serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
@@ -38,6 +40,8 @@ impl Manifest {
                 header.version
             )));
         }
+        // Three readings of the same bytes: header, raw fields for what serde leaves out, and the
+        // values.
         let fields: serde_json::Value = parse(bytes)?;
         seal::check(bytes, &fields)?;
         known::check(&fields)?;

@@ -22,6 +22,7 @@ pub(super) fn check(bytes: &[u8], manifest: &Value) -> Result<()> {
         Some(Value::String(text)) if text.len() == DIGITS => text,
         Some(_) => return Err(bad(FIELD, "must be 64 hex digits")),
     };
+    // By bytes and not by the parsed value: the digest is of the file as it lies there.
     let places: Vec<usize> = bytes
         .windows(DIGITS)
         .enumerate()

@@ -10,9 +10,13 @@ use field::memory;
 
 /// A parsed safetensors file.
 pub struct TensorFile {
+    /// Of the file, for messages.
     name: String,
+    /// The whole file: tensors are views of it until they are copied.
     bytes: Vec<u8>,
+    /// Where the data begins.
     start: usize,
+    /// The header: name, dtype, shape and range of each tensor.
     metadata: Metadata,
 }
 

@@ -25,6 +25,7 @@ const POINTED_MM: f32 = 0.2;
 const MOST_CORNERS: usize = 64;
 
 #[derive(Clone, Debug)]
+/// What is rounded by the radius.
 enum Core {
     /// Along y; 0 is a point.
     Segment {
@@ -47,7 +48,9 @@ enum Origin {
 #[derive(Clone, Debug)]
 pub struct Body {
     origin: Origin,
+    /// What distances are measured to; a rod's or blade's may be thicker than the shape asked for.
     core: Core,
+    /// By which the core is rounded, mm.
     radius: f32,
     /// It has a corner that is less than [`BLUNT_MM`] thick a millimetre behind.
     pointed: bool,

@@ -1,4 +1,7 @@
 //! Why a shape is refused.
+//!
+//! Each message names the place or the field and says what to do about it: a host shows it to
+//! whoever has made the tool.
 
 /// A shape that no tool can have.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,5 +1,10 @@
 //! Force at one contact: Signorini's condition and Coulomb's law in a local frame (normal, two tangents).
 //!
+//! The sweeps around it (block Gauss-Seidel) call this for one contact after another with the
+//! forces of the others fixed; `W` is the 3x3 block of the compliance there. See Jourdan, Alart and
+//! Jean, A Gauss-Seidel like algorithm to solve frictional contact problems, Comput. Methods Appl.
+//! Mech. Engrg. 155, 1998.
+//!
 //! With `r = b + W f`, `r` the gap and the two components of slip under the force `f`, `W` symmetric positive definite:
 //! `0 <= f_n _|_ r_n >= 0`, `|f_t| <= mu f_n`, and `f_t = -mu f_n r_t / |r_t|` where it slips.
 
@@ -42,6 +47,8 @@ pub fn clamp_tangential(force: Vector, friction: f32) -> Vector {
 }
 
 /// The force at one contact. `inverse` is that of `w`; `guess` is where a slip's direction is searched from.
+/// Three cases: the gap is open and there is no force; the force that stops all slip lies in the
+/// friction cone and is taken; or the contact slips and its direction is iterated for.
 pub fn coulomb(w: &Matrix, inverse: &Matrix, b: Vector, friction: f32, guess: Vector) -> Vector {
     if b.x >= 0.0 {
         return Vector::ZERO;
@@ -49,6 +56,7 @@ pub fn coulomb(w: &Matrix, inverse: &Matrix, b: Vector, friction: f32, guess: Ve
     if friction <= 0.0 {
         return Vector::new(-b.x / w.x_axis.x, 0.0, 0.0);
     }
+    // Signorini and no slip at once: `b + W f = 0`.
     let stick = -(*inverse * b);
     if stick.x >= 0.0 && across(stick) <= friction * stick.x {
         return stick;

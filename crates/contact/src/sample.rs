@@ -1,11 +1,17 @@
 //! A point of the surface: a fixed combination of nodes.
+//!
+//! Contact is looked at and solved at such points, which lie between nodes, too, where a mesh is
+//! coarse. A force on a sample is shared among its nodes by the weights, which is the transpose of
+//! how its place follows from theirs.
 
 use parry3d::math::Vector;
 
 /// A point of the surface: nodes and weights that sum to 1. Unused places repeat the first node with weight 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
+    /// Three of a face; four where a cut has put a corner inside of an element.
     pub nodes: [u32; 4],
+    /// In the order of the nodes.
     pub weights: [f32; 4],
 }
 
@@ -37,6 +43,8 @@ impl Sample {
     }
 
     /// The mean of points of one element: four nodes in all.
+    /// Equal nodes are added up. The first of them fills what is left of the places, as in
+    /// [`Sample::on_face`].
     fn mean(parts: [Sample; 3], weights: [f32; 3]) -> Sample {
         let mut mean = Sample {
             nodes: [parts[0].nodes[0]; 4],

@@ -14,7 +14,8 @@ use parry3d::math::{Matrix, Vector};
 
 /// The largest stiffness (N/m), and the largest damping (N s/m): beyond, the length of a tie is known less well than its tension.
 pub const LARGEST_STIFFNESS: f32 = 1e6;
-/// Steps of a solve at most.
+/// Steps of a solve at most: Newton's method needs a few, and thirty halvings of the bounds end at
+/// the last bit of f32 in any case.
 const ROUNDS: usize = 30;
 /// A step that changes the tension by less than this part of it is the last.
 const SETTLED: f32 = 1e-6;
@@ -78,7 +79,9 @@ pub struct Spring {
 pub struct Tie {
     /// The point of the tissue.
     pub point: TiePoint,
+    /// Where it is tied to beside the tissue.
     pub end: End,
+    /// How it pulls.
     pub spring: Spring,
     /// It breaks under a larger tension, mN; 0: never.
     pub break_mn: f32,
@@ -87,9 +90,13 @@ pub struct Tie {
 /// The tension of a spring over one step, by its length at the end: `rate l - offset`, in the caller's unit of force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pull {
+    /// `k + c / h`.
     rate: f32,
+    /// `k s + c l_0 / h`, with the length `l_0` at the start of the step.
     offset: f32,
+    /// `s`, mm.
     slack: f32,
+    /// As of the spring.
     pushes: bool,
 }
 

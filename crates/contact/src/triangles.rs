@@ -7,9 +7,11 @@ use parry3d::shape::{CompositeShapeRef, TriMesh, TriMeshFlags};
 use parry3d::transformation::try_convex_hull;
 use std::collections::HashMap;
 
-/// Below this the direction to the nearest point is rounding, and the triangle's normal is taken, mm.
+/// Below this the direction to the nearest point is rounding, and the triangle's normal is taken,
+/// mm: coordinates of some hundred millimetres are known to 3e-5 mm in f32.
 const CLOSE: f32 = 1e-4;
-/// Faces of less than this share of the surface may be slivers, whose normal is rounding.
+/// Faces of less than this share of the surface may be slivers, whose normal is rounding: an honest
+/// mesh from a scanner has some, and is not refused for them.
 const NO_FACE: f32 = 1e-3;
 
 /// A closed surface in the tool's own frame, mm, whose faces look outward; made once, read by all threads.
@@ -20,6 +22,9 @@ pub(crate) struct Triangles {
 
 impl Triangles {
     /// The convex hull of points.
+    ///
+    /// # Errors
+    /// [`ShapeError::Flat`] where they have no volume.
     pub fn hull(points: &[[f32; 3]]) -> Result<Self, ShapeError> {
         let cloud: Vec<Vector> = points.iter().map(|p| Vector::from(*p)).collect();
         let (vertices, faces) = try_convex_hull(&cloud).map_err(|error| ShapeError::Flat {
@@ -30,8 +35,13 @@ impl Triangles {
     }
 
     /// A closed surface, turned outward where it is inside out. Several closed parts may be in it, or hollows, if none crosses another.
+    ///
+    /// # Errors
+    /// [`ShapeError::Face`], [`ShapeError::Open`], [`ShapeError::Crossing`],
+    /// [`ShapeError::InsideOut`] and [`ShapeError::Flat`], with the place where it is wrong.
     pub fn surface(points: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<Self, ShapeError> {
         let count = points.len();
+        // A closed surface has each directed edge once, and its opposite once.
         let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
         for (index, face) in faces.iter().enumerate() {
             if face.iter().any(|node| *node as usize >= count) {

@@ -1,4 +1,8 @@
 //! Ways along a line through a tool, by marches of its signed distance: where the line enters it, and how far it is out.
+//!
+//! Sphere tracing (Hart, Sphere tracing, The Visual Computer 12, 1996): the signed distance says
+//! how far one may go in any direction without passing the surface. It works for every shape of
+//! tool, since all that it asks is [`Body::nearest`].
 
 use crate::body::Body;
 use parry3d::math::{Pose, Vector};

@@ -1,4 +1,9 @@
 //! A uniform cell grid over points in mm: radius queries and nearest point, for load-time searches.
+//!
+//! Cells are cubes with about two points each, so a query looks at a few of them. Points of a cell
+//! lie one behind the other, in the order of their numbers, which makes ties of
+//! [`PointGrid::nearest`] the same on every machine. It is made when a bundle is opened and no step
+//! uses it.
 
 use crate::memory;
 
@@ -38,9 +43,11 @@ impl PointGrid {
             }
         }
         let count = (points.len() / 3).max(1);
+        // A flat cloud, or a single point, still has a cell.
         let extent = [0, 1, 2].map(|axis| (high[axis] - low[axis]).max(1e-3));
         let volume = extent[0] as f64 * extent[1] as f64 * extent[2] as f64;
         let longest = extent.iter().copied().fold(0.0, f32::max);
+        // At most some 256 cells along the longest axis, however thin the cloud is.
         let cell = (libm::cbrt(2.0 * volume / count as f64) as f32).max(longest / 256.0);
         let dims = extent.map(|length| (length / cell) as usize + 1);
         let mut grid = PointGrid {
@@ -59,6 +66,7 @@ impl PointGrid {
         for &cell in &cells {
             grid.offsets[cell + 1] += 1;
         }
+        // Counts become starts.
         for i in 1..grid.offsets.len() {
             grid.offsets[i] += grid.offsets[i - 1];
         }
@@ -70,6 +78,7 @@ impl PointGrid {
         Ok(grid)
     }
 
+    /// Points outside of the grid are in the nearest cell of its border.
     fn cell_of(&self, p: [f32; 3]) -> [usize; 3] {
         [0, 1, 2].map(|axis| {
             let c = ((p[axis] - self.origin[axis]) / self.cell).floor();
@@ -77,10 +86,12 @@ impl PointGrid {
         })
     }
 
+    /// Place of a cell in the list of all.
     fn index(&self, c: [usize; 3]) -> usize {
         (c[2] * self.dims[1] + c[1]) * self.dims[0] + c[0]
     }
 
+    /// Where a point is, mm.
     fn point(&self, item: u32) -> [f32; 3] {
         let i = 3 * item as usize;
         [self.points[i], self.points[i + 1], self.points[i + 2]]
@@ -131,6 +142,7 @@ impl PointGrid {
             if let Some((_, item)) = best {
                 return item;
             }
+            // Whatever lies within the radius was found, so the first hit is the nearest of all.
             radius *= 2.0;
         }
     }

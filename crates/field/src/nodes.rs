@@ -1,4 +1,8 @@
 //! Fields over the nodes: what a displacement may be, and a sparse set of nodes with a vector each, ascending, checked.
+//!
+//! A [`ContactSet`] is the one form in which a step knows its contact, whether the host gave a
+//! dense field, a list or tools. It is ascending, so that look-ups halve, two sets merge in one
+//! pass, and factors are known again by their list of nodes.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,9 +10,11 @@ use crate::error::{Error, Result};
 use crate::memory::HeldBytes;
 use crate::{memory, stored};
 
-/// Displacements beyond this are refused as input, mm.
+/// Displacements beyond this are refused as input, mm: a kilometre is metres that were given for
+/// millimetres, or garbage.
 pub const INPUT_LIMIT: f32 = 1e6;
 
+/// What there is no memory for, where there is none.
 const CONTACTS: &str = "a step's contacts";
 
 /// Nodes in contact and what is imposed there.
@@ -83,6 +89,7 @@ impl ContactSet {
     }
 
     /// Takes nodes, ascending, each where `field [K,3]` has it.
+    /// There is room for every node, so nothing is allocated.
     pub fn take_nodes(&mut self, nodes: &[u32], field: &[f32]) {
         self.clear();
         for &node in nodes {
@@ -94,6 +101,7 @@ impl ContactSet {
     }
 
     /// What is imposed at a node.
+    /// None where the node is not in contact.
     pub fn at(&self, node: u32) -> Option<[f32; 3]> {
         let i = self.nodes.binary_search(&node).ok()?;
         Some([
@@ -116,6 +124,7 @@ impl ContactSet {
     ///
     /// # Errors
     /// [`Error::Argument`], [`Error::NonFinite`], [`Error::OutOfMemory`].
+    /// Zeros of either sign are no contact.
     pub fn take_dense(&mut self, field: &[f32], node_count: usize) -> Result<()> {
         self.clear();
         if field.len() != 3 * node_count {
@@ -126,6 +135,7 @@ impl ContactSet {
             )));
         }
         let touched = |c: &[f32]| c[0] != 0.0 || c[1] != 0.0 || c[2] != 0.0;
+        // Counted first, so that room is asked for once and before anything is pushed.
         let count = field.chunks_exact(3).filter(|c| touched(c)).count();
         for list in [&mut self.nodes, &mut self.order] {
             memory::reserve(list, count, CONTACTS)?;
@@ -169,6 +179,7 @@ impl ContactSet {
             check("contact_vectors", at, c)?;
             self.order.push(at as u32);
         }
+        // Hosts mostly give ascending lists, which need no sort.
         if nodes.windows(2).any(|pair| pair[0] >= pair[1]) {
             self.order.sort_unstable_by_key(|&at| nodes[at as usize]);
         }

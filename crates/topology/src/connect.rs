@@ -12,7 +12,8 @@ use crate::polytope::{Side, Weights};
 use crate::rest::{FACES, OUTSIDE};
 use crate::room::{collected, push};
 
-/// Parts of a face that overlap by less, of its area, do not.
+/// Parts of a face that overlap by less, of its area, do not: neighbours that only share an edge
+/// have that much in common by rounding.
 const LEAST_OVERLAP: f64 = 1e-9;
 
 /// A cell's part of a face of the mesh, in barycentric coordinates of the two later of its nodes, ascending.
@@ -63,10 +64,12 @@ pub(crate) fn common(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<[f64; 2]> {
 pub(crate) struct Groups(Vec<u32>);
 
 impl Groups {
+    /// Each number a set of its own.
     pub fn new(count: usize) -> Result<Groups, TopologyError> {
         Ok(Groups(collected(count, 0..count as u32)?))
     }
 
+    /// The number of a member's set.
     pub fn of(&mut self, mut at: u32) -> u32 {
         while self.0[at as usize] != at {
             // Path halving: the next search has half as far to go.

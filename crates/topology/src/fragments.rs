@@ -1,4 +1,8 @@
 //! Pieces that nothing holds.
+//!
+//! A piece is a connected component of the graph of living cells, with an edge wherever two cells
+//! have a part of a face in common. A host may drop a loose piece or let it float; the solver needs
+//! every piece that stays to be held somewhere.
 
 use crate::TopologyError;
 use crate::body::Body;
@@ -44,6 +48,7 @@ impl Body {
             let own = self.cells.get(&element).map_or(1, Vec::len) as u32;
             starts.push(starts[element as usize] + own);
         }
+        // Dead cells have numbers, too, but join nothing and give no piece.
         let mut groups = Groups::new(starts[count as usize] as usize)?;
         for element in 0..count {
             for (face, &over) in mesh.neighbours(element).iter().enumerate() {
@@ -90,6 +95,7 @@ impl Body {
                 piece.volume_mm3 += cell.share * cell.kept * mesh.volume(element);
             }
         }
+        // A node was listed once for each of its cells.
         for piece in &mut pieces {
             piece.nodes.sort_unstable();
             piece.nodes.dedup();

@@ -1,4 +1,7 @@
 //! What of a body lasts beside its mesh: for snapshots.
+//!
+//! The mesh is not part of it: whoever restores it has that. Lists are in order (`BTreeMap`), so
+//! that equal bodies have equal bytes.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,10 +14,15 @@ use crate::{RestMesh, TopologyError};
 /// All that operations have made of a mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kept {
+    /// Of the elements that are no longer whole.
     cells: BTreeMap<u32, Vec<Cell>>,
+    /// Of each copy of a node: the mesh node that it stems from.
     parents: Vec<u32>,
+    /// By stroke of a blade: how far each node that it knows lies from it, mm.
     strokes: BTreeMap<u32, BTreeMap<u32, f64>>,
+    /// By stroke: the area that it has opened in each element, mm².
     opened: BTreeMap<u32, BTreeMap<u32, f64>>,
+    /// By element: its stiffness over that of the mesh, where it has changed.
     stiffness: BTreeMap<u32, f32>,
 }
 

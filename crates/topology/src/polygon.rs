@@ -1,4 +1,7 @@
 //! Convex polygons in space.
+//!
+//! Corners are in order and the last is joined to the first. `N` is 3 in space, 4 in the
+//! barycentric coordinates of an element, 2 on a face.
 
 use crate::Point;
 use crate::rest::{cross, minus};
@@ -8,6 +11,7 @@ pub fn clip<const N: usize>(
     points: &[[f64; N]],
     value: impl Fn(&[f64; N]) -> f64,
 ) -> Vec<[f64; N]> {
+    // A corner that lies on the line counts as inside and is not made a second time.
     let mut kept = Vec::with_capacity(points.len() + 1);
     for (at, point) in points.iter().enumerate() {
         let next = &points[(at + 1) % points.len()];

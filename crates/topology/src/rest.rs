@@ -14,12 +14,15 @@ pub const OUTSIDE: u32 = u32::MAX;
 /// It never changes: bodies that are cut share one and keep what differs from it.
 #[derive(Clone, Debug)]
 pub struct RestMesh {
+    /// `[K,3]`, mm.
     positions: Vec<[f32; 3]>,
+    /// `[T,4]`, of positive volume.
     tets: Vec<[u32; 4]>,
     /// Over each face, by opposite corner; [`OUTSIDE`] at the border.
     neighbours: Vec<[u32; 4]>,
     /// Where the elements of each node start in `around`.
     starts: Vec<u32>,
+    /// Elements of each node, ascending, node after node.
     around: Vec<u32>,
     /// See [`RestMesh::gradients`].
     gradients: OnceLock<Vec<f32>>,

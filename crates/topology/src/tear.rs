@@ -10,7 +10,8 @@ use crate::rest::{cross, dot, length, minus};
 use crate::room::push;
 use crate::{Point, Sweep, TopologyError};
 
-/// Half the side of what a cell's tear sweeps, of how far its corners lie from the middle: what is touched at all parts.
+/// Half the side of what a cell's tear sweeps, of how far its corners lie from the middle: what is
+/// touched at all parts, and a sweep of the whole cell would reach far into its neighbours.
 const WIDE: f64 = 0.6;
 
 /// A cell that is to part.

@@ -27,9 +27,9 @@ use crate::scene::tissue::Tissue;
 pub(super) const WHAT: &str = "the present state of a scene";
 /// Below this nothing has moved since the step, s.
 pub(super) const AT_ONCE_S: f64 = 1e-5;
-/// How often the contact of a tool that has lost it is solved again.
+/// How often the contact of a tool that has lost it is solved again: as often as in a step.
 const MORE_PRESSES: u32 = 6;
-/// The last velocities are followed for at most this many steps.
+/// The last velocities are followed for at most this many steps: the next one may be late by one.
 const MOST_STEPS: f64 = 2.0;
 
 /// The nodes that are shown.
@@ -65,6 +65,7 @@ pub(super) struct Between {
 }
 
 impl Between {
+    /// For the scene's body; it knows no step yet.
     pub(super) fn new(scene: &Tissue<'_>) -> Result<Between> {
         let model = scene.model;
         let (Some(prior), Ok(corrections)) = (&model.prior, model.corrections()) else {

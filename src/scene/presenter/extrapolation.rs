@@ -15,7 +15,7 @@ const WHAT: &str = "the present state of a scene";
 /// What the time is stretched by. A tool that goes faster than it did pushes by itself; following it (up to 1.5) or taking tissue back (down
 /// to -1) was no better.
 const STRETCH: [f32; 2] = [0.0, 1.0];
-/// Paths shorter than this do not stretch it, mm.
+/// Paths shorter than this do not stretch it, mm: their ratio would be one of rounding.
 const SMALL_MM: f32 = 0.05;
 /// A tool drives the tissue around it, to half at this distance, mm.
 const NEAR_MM: f32 = 24.0;

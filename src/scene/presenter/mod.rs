@@ -37,7 +37,7 @@ pub struct Presenters {
     region: Option<Box<Presenter>>,
     points: Option<Box<Presenter>>,
     surface: Option<Box<Presenter>>,
-    /// The contact of a frame, for both.
+    /// The contact of a frame, for all three: views of one moment ask the same.
     solves: Solves,
 }
 
@@ -68,6 +68,8 @@ impl Presenters {
     ///
     /// # Errors
     /// [`Error::Unsupported`] for a bundle without linear response or corrections, [`Error::OutOfMemory`], and what `begin` gives.
+    /// A presenter costs several fields of the body and makes each step leave a moment, so only
+    /// hosts that ask for frames have it.
     pub fn prepare(
         &mut self,
         scene: &Tissue<'_>,

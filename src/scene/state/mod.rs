@@ -27,6 +27,7 @@ use records::Records;
 /// What lasts from one step to the next. Region, attached points and options are the host's and are not part of it.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct State {
+    /// Numbers of steps and the times that go with them.
     counters: Counters,
     /// Contact of the last step, and of the one before.
     contact: ContactSet,

@@ -213,6 +213,8 @@ impl UptEngine {
     }
 
     /// Computes the latent state `next`.
+    /// Stages in order: the linear response, the features of all encoder nodes, the network
+    /// ([`UptEngine::network`]). Decoding is asked for later, for the nodes of the plan alone.
     pub fn predict(
         &mut self,
         compute: Compute<'_>,

@@ -1,4 +1,8 @@
 //! How the samples of a surface are made, face by face.
+//!
+//! Corners are samples, edges are cut into equal parts no longer than the spacing, and the inside
+//! of a face is cut by the parts of its longest edge. An edge is cut the same way from both of its
+//! faces, so no sample is made twice and none is missing between two faces.
 
 use crate::sample::{Sample, between};
 use parry3d::math::Vector;

@@ -20,9 +20,11 @@ pub trait HeldBytes {
     const PLAIN: bool = false;
 
     /// Bytes held.
+    /// Not that of the allocator, which rounds up.
     fn held_bytes(&self) -> usize;
 }
 
+/// Types that hold nothing of the heap.
 macro_rules! plain {
     ($($plain:ty),* $(,)?) => {$(
         impl HeldBytes for $plain {
@@ -109,6 +111,7 @@ impl<T: HeldBytes> HeldBytes for Mutex<T> {
     }
 }
 
+/// Tuples hold what their parts do.
 macro_rules! tuples {
     ($(($($name:ident)*))*) => {$(
         impl<$($name: HeldBytes),*> HeldBytes for ($($name,)*) {
