@@ -1,4 +1,12 @@
 //! Kind `upt`: graphs, native weights, and the static tables of a mesh.
+//!
+//! A network of this kind reads features at the supernodes and their neighbours and gathers them
+//! over the graph into one row a supernode; of these rows `latent.onnx` makes the keys and values
+//! of latent tokens, and each node is decoded by a query against them. What depends on positions
+//! alone is computed once for a mesh and kept as tables: rows of the first linear layer for sources
+//! and targets of the graph, and the decoder's queries for all nodes. A step then embeds nothing.
+//! The linear layers of the features, and mostly the decoder, run in this library's own kernels,
+//! which is why their weights are read beside the graphs.
 
 use std::sync::Arc;
 
@@ -15,6 +23,8 @@ use crate::options::Precision;
 const TABLES: &str = "the tables of a mesh";
 
 /// Nodes a run of `embed.onnx`.
+/// The graph's batch is fixed to it, and the last tile is filled up with zeros whose rows are
+/// dropped. It bounds what ONNX Runtime holds while a large mesh is embedded.
 const EMBED_TILE: usize = 2048;
 
 /// Everything that depends on the mesh alone.
@@ -167,6 +177,8 @@ impl UptModel {
     }
 }
 
+/// Weights and biases of the decoder by their names in the file, checked against the manifest's
+/// widths and laid out anew for the native kernel: `h` hidden, `m` inside of the MLP.
 fn pack_decoder(file: &TensorFile, entry: &UptEntry) -> Result<PackedDecoder> {
     let (h, m) = (entry.dims.decoder, entry.dims.decoder_mlp);
     let tensors = |name: &str, shape: &[Option<usize>]| {
@@ -195,6 +207,13 @@ fn pack_decoder(file: &TensorFile, entry: &UptEntry) -> Result<PackedDecoder> {
     PackedDecoder::new(file.name(), &weights)
 }
 
+/// The graph of a mesh and its tables, made when a model is opened, or a scene with a mesh of its
+/// own.
+///
+/// Of `embed.onnx`'s three outputs the query rows are kept for every node, the others only where
+/// the graph asks for them: sources at supernodes and neighbours, targets at supernodes. So a tile
+/// is embedded whole, and most of it is dropped. Node lists are ascending, which is why rows can
+/// simply be appended tile by tile.
 fn make_tables(
     entry: &UptEntry,
     embed: &[u8],
@@ -205,6 +224,7 @@ fn make_tables(
     let _span = tracing::debug_span!("tables", nodes = mesh.node_count()).entered();
     let graph = SupernodeGraph::of_mesh(mesh, &entry.graph)?;
     let encode_nodes = graph.needed_nodes()?;
+    // From nodes of the mesh to rows of the table.
     let mut row = memory::filled(mesh.node_count(), u32::MAX, TABLES)?;
     for (at, &node) in encode_nodes.iter().enumerate() {
         row[node as usize] = at as u32;
@@ -299,6 +319,8 @@ fn embed_points(
         let outputs = [("source_table", d), ("target_table", d), ("query_table", q)];
         for (index, (name, width)) in outputs.into_iter().enumerate() {
             let values = &stage.output(index)[..count * width];
+            // Of steps made with such a row the guard could only say that they are not finite; here
+            // the file that is at fault is known.
             if values.iter().any(|x| !x.is_finite()) {
                 return Err(Error::bundle(
                     "embed.onnx",

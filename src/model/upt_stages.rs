@@ -1,4 +1,8 @@
 //! Sessions of a `upt` bundle's graphs, with the shapes of a scene's mesh.
+//!
+//! Shapes are fixed when a session is made, since ONNX Runtime can then plan its memory once, and a
+//! captured CUDA graph allows no others. `L` latent tokens of width `h`, `d` the encoder's width,
+//! `K` nodes, `n_S` supernodes, `e` encoded nodes with `f` features each.
 
 use super::upt::{GraphFile, UptModel, UptTables};
 use crate::error::{Error, Result};
@@ -50,6 +54,9 @@ impl UptModel {
 
     /// A session of the decoder graph for tiles of [`DECODER_TILE`] nodes:
     /// `queries [n,2h]`, `keys`, `values` -> `displacement [n,3]`.
+    ///
+    /// One thread: the scene's own pool runs the tiles side by side, each with a stage of this
+    /// kind.
     pub fn decoder_stage(&self, runtime: &'static Runtime, plan: &ProviderPlan) -> Result<Stage> {
         let dims = &self.entry.dims;
         let kv: &[usize] = &[dims.latent_tokens, dims.decoder];
@@ -71,6 +78,9 @@ impl UptModel {
     }
 
     /// A session of the decoder graph for all nodes, their queries `[K,2h]` bound once: `keys`, `values` -> `displacement [K,3]`.
+    ///
+    /// Meant for a device: all nodes in one run, while the queries, by far the largest input, stay
+    /// where they are.
     pub fn resident_decoder(
         &self,
         runtime: &'static Runtime,
@@ -124,6 +134,9 @@ impl UptModel {
         let (dims, graph) = (&self.entry.dims, &tables.graph);
         let (d, q, rows) = (dims.encoder, dims.query, tables.encode_nodes.len());
         let (supernodes, degree) = (graph.supernodes.len(), self.entry.graph.max_degree);
+        // The graph has a rectangle of neighbours where the tables have lists of different lengths.
+        // A place that is not used names row 0 and has the mask 0, so that it adds nothing to the
+        // mean.
         let mut neighbours = memory::filled(supernodes * degree, 0i64, STEP)?;
         let mut mask = memory::zeros(supernodes * degree, STEP)?;
         for row in 0..supernodes {

@@ -1,4 +1,10 @@
 //! ONNX Runtime's GPU providers: whether the loaded library offers one, and what it is told.
+//!
+//! Each provider is built with `error_on_failure`: without it a session is made although its
+//! provider fails, and a model would run on the CPU while it says that it runs on a card. An error
+//! instead sends [`crate::onnx::ProviderPlan`] on to the next one of the host's list, and its
+//! reason is kept. A stream of the host's is given on as an address; the promise that it lives as
+//! long as the model was made where the `UserStream` was.
 
 use ort::ep::{self, ExecutionProvider};
 
@@ -25,6 +31,8 @@ pub(super) fn missing(provider: Provider) -> Option<String> {
     }
 }
 
+/// The reason that goes with the library's answer. That a provider was built in does not yet mean
+/// that the machine has a card for it: making the session tells.
 fn not_offered(provider: Provider, available: ort::Result<bool>) -> Option<String> {
     match available {
         Ok(true) => None,
@@ -42,6 +50,9 @@ fn built_in_rtx() -> bool {
 }
 
 /// What a provider is told that is not missing; compiled engines are kept in the folder `cache`.
+///
+/// TensorRT-RTX has two ways in, as a built-in provider and as a plugin, whose options have other
+/// names.
 pub(super) fn wish(
     options: &ModelOptions,
     provider: Provider,
@@ -60,6 +71,8 @@ pub(super) fn wish(
     }
 }
 
+/// TF32 rounds the factors of products to 10 bits of mantissa, so it is the host that allows it. A
+/// memory limit of 0 is none.
 fn cuda(options: &ModelOptions) -> Wish {
     let mut cuda = ep::CUDA::default()
         .with_device_id(options.device_id)
@@ -75,6 +88,8 @@ fn cuda(options: &ModelOptions) -> Wish {
     Wish::Builtin(cuda.build().error_on_failure())
 }
 
+/// The timing cache lies in the folder of the engines: one that has to be built again is built from
+/// times that are known.
 fn tensorrt(options: &ModelOptions, cache: Option<String>) -> Wish {
     let mut trt = ep::TensorRT::default()
         .with_device_id(options.device_id)
@@ -94,6 +109,8 @@ fn tensorrt(options: &ModelOptions, cache: Option<String>) -> Wish {
     Wish::Builtin(trt.build().error_on_failure())
 }
 
+/// It is told nothing of precision, which is the graph's own. Its devices are counted without a
+/// sign here, and a negative number becomes the first.
 fn tensorrt_rtx(options: &ModelOptions, cache: Option<String>) -> Wish {
     let mut rtx = ep::NVRTX::default()
         .with_device_id(options.device_id.max(0) as u32)

@@ -1,4 +1,9 @@
 //! Whether a graph has what a stage binds to it.
+//!
+//! The check comes between making a session and binding: a binding takes any tensor, and a wrong
+//! one fails in the first run, far from the file whose fault it is. A dimension that the graph
+//! leaves open (negative in ONNX Runtime's answer) fits every size; a fixed one must be the
+//! stage's.
 
 use ort::session::Session;
 use ort::value::{Outlet, TensorElementType, ValueType};
@@ -8,6 +13,9 @@ use crate::onnx::Tensors;
 
 impl Tensors<'_> {
     /// Names and shapes of all, as text.
+    ///
+    /// The values of constants are left out: an engine depends on what their shapes are, not on
+    /// what they hold.
     pub(super) fn shapes(&self) -> String {
         let constants: Vec<_> = self.constants.iter().map(|c| (c.0, c.1)).collect();
         let indices: Vec<_> = self.indices.iter().map(|c| (c.0, c.1)).collect();
@@ -32,6 +40,7 @@ impl Tensors<'_> {
         for (name, shape) in self.outputs {
             find(file, "output", session.outputs(), name, shape, float)?;
         }
+        // All that a stage binds was found, so that one input more is one that nothing would fill.
         let count = self.inputs.len() + self.constants.len() + self.indices.len();
         if inputs.len() != count {
             let names: Vec<&str> = inputs.iter().map(Outlet::name).collect();
@@ -44,6 +53,7 @@ impl Tensors<'_> {
     }
 }
 
+/// Looks for one input or output by its name, with its element type and shape.
 fn find(
     file: &str,
     what: &str,

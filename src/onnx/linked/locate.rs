@@ -1,4 +1,8 @@
 //! Where ONNX Runtime's shared library may be: next to libupt, `ORT_DYLIB_PATH`, then the system.
+//!
+//! A copy next to libupt is the one that was shipped with it, so it comes before what a machine
+//! happens to have. A host that names a path means that file: where it cannot be loaded nothing
+//! else is tried, since a silent second choice would be another version with other bits.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -23,6 +27,8 @@ pub fn candidates(explicit: Option<&Path>) -> Vec<(PathBuf, &'static str)> {
     }
     let mut found = Vec::new();
     if let Some(folder) = own_folder() {
+        // Where none is there, the plain name goes into the list all the same: the message about a
+        // failed search then says that this folder was looked into.
         let mut beside = libraries_in(&folder);
         if beside.is_empty() {
             beside.push(folder.join(plain_name()));
@@ -42,11 +48,16 @@ pub fn candidates(explicit: Option<&Path>) -> Vec<(PathBuf, &'static str)> {
     found
 }
 
+/// The path seen from the working folder of this moment; the file need not exist, and links are not
+/// followed.
 fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// Libraries of any version in a folder, the newest name last in the alphabet first.
+///
+/// "Newest" is by the alphabet, so that `.so.1.9` comes before `.so.1.10`. In the folder of one
+/// package the longest name comes first, which is the file that the shorter ones link to.
 fn libraries_in(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return Vec::new();
@@ -65,6 +76,9 @@ fn libraries_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Folder of the shared object or executable that holds this code.
+///
+/// Asked of the loader by an address in this code, since the executable's own folder is another
+/// where libupt is a shared library in a game engine or in Python.
 #[cfg(unix)]
 pub fn own_folder() -> Option<PathBuf> {
     use std::os::unix::ffi::OsStrExt;
@@ -98,6 +112,7 @@ pub fn own_folder() -> Option<PathBuf> {
         ) -> i32;
         fn GetModuleFileNameW(module: *mut core::ffi::c_void, name: *mut u16, size: u32) -> u32;
     }
+    // FROM_ADDRESS, and UNCHANGED_REFCOUNT: no handle that would have to be given back.
     const FROM_ADDRESS_UNCHANGED: u32 = 0x4 | 0x2;
     let mut module = std::ptr::null_mut();
     let mut name = [0u16; 4096];

@@ -24,6 +24,7 @@ const COMPANIONS: [&str; 3] = if cfg!(windows) {
     ]
 };
 
+/// As the plugin's package has it. On macOS there is none, and the name is then not found.
 fn file_name() -> &'static str {
     if cfg!(windows) {
         "onnxruntime_providers_nv_tensorrt_rtx.dll"
@@ -36,6 +37,9 @@ fn file_name() -> &'static str {
 ///
 /// # Errors
 /// Why there is none: where it was searched, what the loader said, or that no card here is supported.
+///
+/// The outcome is kept, whichever it is: a second model gets the first one's answer, and nothing is
+/// searched or opened again.
 pub(super) fn available(runtime: &'static Runtime) -> Result<(), String> {
     static OUTCOME: OnceLock<Result<(), String>> = OnceLock::new();
     OUTCOME
@@ -43,6 +47,8 @@ pub(super) fn available(runtime: &'static Runtime) -> Result<(), String> {
         .clone()
 }
 
+/// Where the plugin may be, in order. A relative folder of ONNX Runtime's is left out: that is the
+/// plain name which the system's search path found, and says nothing about where the file is.
 fn candidates(onnxruntime: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     if let Some(folder) = own_folder() {
@@ -64,6 +70,8 @@ fn candidates(onnxruntime: &Path) -> Vec<PathBuf> {
     found
 }
 
+/// Registers the first candidate that is a file. Its companions are opened before it: afterwards
+/// the loader has them, wherever they lie.
 fn register(runtime: &'static Runtime, candidates: &[PathBuf]) -> Result<(), String> {
     let Some(path) = candidates.iter().find(|path| path.is_file()) else {
         let tried: Vec<String> = candidates
@@ -103,6 +111,8 @@ fn open_companions(plugin: &Path) {
     };
     let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     files.sort();
+    // Of several versions the first that opens is enough. One that does not open is only noted: the
+    // loader may find it elsewhere, and registering the plugin tells if not.
     for stem in COMPANIONS {
         let of_stem = |path: &&PathBuf| {
             path.file_name().is_some_and(|name| {

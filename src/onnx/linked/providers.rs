@@ -1,4 +1,10 @@
 //! Execution providers: which are tried for a session, in order, and which this machine offers.
+//!
+//! A model's options name providers in the order of preference. A provider is asked three things
+//! one after the other: whether this build and the loaded library have it, whether its options can
+//! be met, and whether it makes a session of the graph. The first that says yes to all is taken;
+//! the reasons of the others are kept, because a host that asked for a card and got the CPU wants
+//! to know why.
 
 use std::collections::BTreeMap;
 
@@ -25,6 +31,8 @@ impl ProviderPlan {
         mut make: impl FnMut(Provider, Wish) -> std::result::Result<T, String>,
     ) -> Result<(T, ProviderChoice)> {
         let mut refused = Vec::new();
+        // The list has the CPU in it where fallback is on: then only a graph that no provider can
+        // run leaves this loop without a session.
         for &provider in &self.options.providers {
             let made = self
                 .wish(provider, file, graph, tensors)
@@ -49,6 +57,8 @@ impl ProviderPlan {
             .iter()
             .map(|(provider, reason)| format!("{}: {reason}", provider.name()))
             .collect();
+        // All reasons in one message: the first alone often says only that a library is missing,
+        // and the last only that the CPU was not asked.
         let note = match self.options.fallback {
             true => "",
             false => " (fallback is off)",
@@ -63,6 +73,10 @@ impl ProviderPlan {
     ///
     /// # Errors
     /// A CUDA graph was asked for and the tensors have no fixed addresses on the device.
+    ///
+    /// Memory bound anew in each run is good enough otherwise, but a captured graph replays the
+    /// addresses that it was captured with: with other tensors it would read and write freed
+    /// memory.
     pub(super) fn memory(
         &self,
         runtime: &'static Runtime,
@@ -79,6 +93,11 @@ impl ProviderPlan {
     }
 
     /// Folder of this session's compiled engines, which is made.
+    ///
+    /// An engine is of one graph, one set of shapes, one precision, one card and one version of
+    /// ONNX Runtime; all of them go into the folder's name, so that a bundle that is replaced in
+    /// place cannot meet the engine of the one before it. `Ok(None)` where the host named no
+    /// folder: then each session is compiled again, and the host waits for it.
     fn engine_cache(
         &self,
         provider: Provider,
@@ -91,6 +110,8 @@ impl ProviderPlan {
         };
         let runtime = Runtime::get(library::current().onnxruntime_path.as_deref())
             .map_err(|error| error.to_string())?;
+        // The precision is named here and not left to the graph: TensorRT makes float16 engines of
+        // a float32 graph, too.
         let fp16 = self.options.precision == Some(Precision::F16);
         let key = engine_key(&[
             provider.name(),
@@ -104,6 +125,8 @@ impl ProviderPlan {
         Ok(Some(folder.display().to_string()))
     }
 
+    /// What a session is asked for, or why this machine has no such provider. The cheap question
+    /// comes first: a folder is made only for a provider that is there.
     fn wish(
         &self,
         provider: Provider,

@@ -22,8 +22,13 @@ use crate::options::Provider;
 
 /// A tensor of the host's and its counterpart on a device.
 struct Buffer {
+    /// Of the graph's input or output: what it is bound by.
     name: String,
+    /// What the rest of the library writes before a run or reads after it; pinned where the session
+    /// offers such memory.
     host: Tensor<f32>,
+    /// Bound in its place, at an address that stays for the stage's life; none in the host's
+    /// memory.
     device: Option<Tensor<f32>>,
 }
 
@@ -31,14 +36,25 @@ struct Buffer {
 pub struct Stage {
     // Dropped before the session that it was made from.
     binding: IoBinding,
+    /// In the order in which the stage was asked for them, which is what [`Stage::input`] counts
+    /// by.
     inputs: Vec<Buffer>,
+    /// Likewise for [`Stage::output`].
     outputs: Vec<Buffer>,
+    /// On the CPU it is shared with the model's other stages of this graph, so that weights lie in
+    /// memory once; what a run needs for itself is the binding.
     session: Arc<Session>,
+    /// Of inputs that were bound once and whose tensors the binding owns: no field here holds them.
     constant_bytes: usize,
+    /// How the tensors get to the session, chosen when it was made.
     memory: Memory,
+    /// Its environment makes the copies between host and device.
     runtime: &'static Runtime,
+    /// Which provider was taken, and why those before it were not.
     choice: ProviderChoice,
+    /// Of the last run, ms; zero before the first.
     times: StageTimes,
+    /// The graph's name, for messages.
     file: String,
 }
 
@@ -69,6 +85,9 @@ impl Stage {
     }
 
     /// A device's first runs, on the inputs as they are: kernels are loaded, engines built, a CUDA graph captured.
+    ///
+    /// Called when a scene is made, so that none of its steps pays for it. The outputs mean nothing
+    /// afterwards.
     pub fn warm_up(&mut self) -> Result<()> {
         if self.choice.provider != Provider::Cpu {
             (0..3).try_for_each(|_| self.run())?;
@@ -77,6 +96,10 @@ impl Stage {
     }
 
     /// Runs the graph.
+    ///
+    /// The three parts are timed apart, because only the middle one is the provider's: on a small
+    /// graph the copies to a card and back can cost more than what they save. On an error the
+    /// outputs hold whatever was written, and the caller keeps the last state.
     pub fn run(&mut self) -> Result<()> {
         let start = Instant::now();
         let since = |start: Instant| start.elapsed().as_secs_f64() * 1e3;
@@ -95,6 +118,8 @@ impl Stage {
         failed(&self.file, &cause)
     }
 
+    /// Makes the host's inputs visible to the session. Nothing on the CPU, where the session reads
+    /// them in place.
     fn upload(&mut self) -> Result<()> {
         match self.memory {
             Memory::Host => Ok(()),
@@ -120,6 +145,8 @@ impl Stage {
         }
     }
 
+    /// The run itself, by the C interface: the wrapper's call asks for a session that is borrowed
+    /// for writing, which one that is shared between stages cannot give.
     fn compute(&mut self) -> Result<()> {
         let session = self.session.inner();
         // SAFETY: session and binding are alive; `&mut self` makes this the only run of the binding. A session takes runs of
@@ -135,6 +162,7 @@ impl Stage {
         outcome.map_err(|error| self.failed(error))
     }
 
+    /// Copies the outputs to the host's tensors, where they lie on a device.
     fn download(&mut self) -> Result<()> {
         for output in &mut self.outputs {
             if let Some(device) = &output.device {

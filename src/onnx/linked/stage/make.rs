@@ -1,5 +1,10 @@
 //! How a stage comes to be: a session of its graph on the first provider that can run it, or the session that another stage
 //! on the CPU has of it, and tensors bound to it.
+//!
+//! Only sessions on the CPU are shared. There a session is weights and a plan, which many runs may
+//! use at once; on a card it also owns a stream and perhaps a captured graph with the addresses of
+//! one binding. Sessions are found again by the graph's file and by the number of threads, since a
+//! session's threads are its own.
 
 use std::sync::Arc;
 
@@ -48,6 +53,8 @@ impl Stage {
         options: &StageOptions,
     ) -> Result<Stage> {
         let _span = tracing::debug_span!("session", file).entered();
+        // A graph that cannot be read is the bundle's fault and not a provider's. It is remembered
+        // here, because inside of `choose` it looks like one more refusal.
         let mut invalid = None;
         let key = (file.to_owned(), options.threads);
         if let Some((session, choice)) = options.plan.sessions.find(&key) {
@@ -70,6 +77,8 @@ impl Stage {
             return Err(Error::bundle(file, format!("not a valid graph: {cause}")));
         }
         let ((session, memory), mut choice) = made?;
+        // How many nodes each provider took: one that gave half of the graph back to the CPU is a
+        // choice that a host should see.
         choice.nodes = placement::nodes_by_provider(&session);
         choice.memory = memory.name();
         let session = Arc::new(session);
@@ -79,6 +88,11 @@ impl Stage {
         Stage::bind(runtime, file, tensors, session, memory, choice)
     }
 
+    /// Makes the tensors and binds them to a session that is there.
+    ///
+    /// Inputs and outputs keep their tensors in the stage, which writes and reads them; constants
+    /// and indices are bound and then owned by the binding alone. Everything that a run needs is
+    /// allocated here, and a run allocates nothing of ours.
     pub(super) fn bind(
         runtime: &'static Runtime,
         file: &str,
@@ -104,6 +118,8 @@ impl Stage {
         let (inputs, mut outputs) = (buffers(tensors.inputs)?, buffers(tensors.outputs)?);
         let mut binding = session.create_binding().map_err(|error| failed(&error))?;
         for input in &inputs {
+            // On a device the constants lie there from now on: later runs upload only what the
+            // stage wrote.
             binding
                 .bind_input(
                     input.name.as_str(),
@@ -155,6 +171,11 @@ impl Stage {
 }
 
 /// A session's options: its threads do not spin between runs and flush denormals.
+///
+/// Threads that spin would take the cores from the scene's own pool between two steps. Denormals
+/// are flushed because an ordinary product is many times faster than one with them, and near rest
+/// activations may be that small. Operators run one after another, each on all of the session's
+/// threads.
 pub(super) fn configure(
     runtime: &'static Runtime,
     options: &StageOptions,
