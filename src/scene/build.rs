@@ -1,4 +1,10 @@
 //! What a scene of a model is made of.
+//!
+//! A scene is put together from the outside in: threads and instruction set, the mesh (the bundle's
+//! or the host's own), the engine that predicts, the corrector that makes the elements' equation of
+//! motion hold, and around them the step's states. Each part is checked where it is made, so that
+//! what comes out can step. Large parts are boxed with room that was asked for, since `Box::new`
+//! ends the process where memory runs out.
 
 use std::sync::Arc;
 
@@ -32,6 +38,7 @@ pub(super) fn build(
     options: &SceneOptions,
     envelope: Option<EnvelopeCheck>,
 ) -> Result<Core> {
+    // 0 leaves it to the model, which was opened with the number of threads of its host.
     let threads = match options.threads {
         0 => model.execution.threads,
         threads => threads,
@@ -42,8 +49,12 @@ pub(super) fn build(
         )));
     }
     let isa = model.execution.isa;
+    // Tables that are made here are part of the bits of later steps, so they are made in the mode
+    // of the steps; it is put back where this function ends.
     let _mode = FlushToZero::of_portable(isa);
     let pool = Pool::of(isa, threads)?;
+    // A linear response is of the mesh that it was computed for. A network alone is not: it takes
+    // the positions as an input, and gets tables of the other mesh.
     let own_mesh = match &options.mesh_path {
         None => None,
         Some(path) => {
@@ -73,6 +84,8 @@ pub(super) fn build(
             let engine = reduced::ReducedEngine::new(model, kind, table)?;
             Engine::Reduced(memory::boxed(engine, SCENE)?)
         }
+        // Made inside of a closure: a build without the feature "learned" has no such model, and
+        // none of its code.
         KindModel::Upt(kind) => {
             let make = || {
                 let (tables, node_count) = match &own_mesh {

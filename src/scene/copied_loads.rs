@@ -1,4 +1,10 @@
 //! A copy of a host's loads and ties, for a step that is submitted.
+//!
+//! A step that is submitted is made later on another thread, when the host's lists may be gone; so
+//! they are copied, and the copy is lent out as [`Loads`] when the step is made. Lists of lists lie
+//! flat, one after the other, with their lengths beside them: a submission then allocates nothing
+//! once its lists have had their size. The numbers of entries are within their bounds: a step is
+//! checked before it is copied.
 
 use ::contact::Tie;
 

@@ -1,5 +1,11 @@
 //! The step itself: check, predict, decode, boundary conditions, guard, publish (design: the paper's Eq. 2).
 //!
+//! A step has two halves. Up to the guard it works on `states.next` and other scratch, and may fail
+//! at any place; from `publish` on it cannot fail, because all room was asked for in
+//! `fit_published`. So a host sees a step whole or not at all. Readers on other threads take the
+//! lock of what is published for as long as a copy takes; the step writes only while frames change
+//! places and its numbers are told.
+//!
 //! REQ-033: Steps allocate nothing in steady state.
 
 use crate::clock::Instant;
@@ -23,7 +29,9 @@ use crate::stats::SceneStats;
 
 /// Everything of a scene that only its stepping thread touches: what makes states, and the hands that are told of them.
 pub struct Core {
+    /// What makes the next state, with all scratch of a step.
     pub(super) maker: StepMaker,
+    /// Haptic loops that get a model of the tissue near their tool after each step.
     pub(super) hands: Hands,
 }
 
@@ -51,11 +59,13 @@ impl Core {
         input: StepInput<'_>,
         out: Option<Output<'_, f32>>,
     ) -> Result<()> {
+        // For as long as this call: the host's own code keeps its mode.
         let _mode = FlushToZero::of(self.maker.machine.isa);
         let start = Instant::now();
         let step_count = self.maker.states.counters.step_count;
         let span = new_span(step_count).entered();
         let mut stats = self.blank_stats();
+        // Asked first: a step that could not be given back should not be made.
         if let Some(out) = &out {
             lock_read(published).check_len(View::Region, out.len())?;
         }
@@ -80,6 +90,7 @@ impl Core {
         let counters = &mut self.maker.states.counters;
         counters.driven = tools.driven;
         counters.loaded = loads.loaded;
+        // Also a step of a sleeping scene counts: the host's clock goes on.
         counters.step_count += 1;
         stats.step_count = counters.step_count;
         stats.sleeping = counters.sleeping;
@@ -103,6 +114,7 @@ impl Core {
     pub(super) fn memory_bytes(&self) -> usize {
         let maker = &self.maker;
         let published = if maker.options.cubic_sampling { 3 } else { 2 };
+        // A node's number and three floats of its vector, for as many contacts as there are nodes.
         let contacts_in_the_hosts_order = 16 * maker.body.mesh.node_count();
         maker.memory_bytes()
             + published * maker.states.next.held_bytes()

@@ -1,4 +1,10 @@
 //! Corrections inside a step: after the prediction, before the guard.
+//!
+//! A prediction is corrected where there is something that the model has not learned: contact,
+//! loads, or a body that swings after them. The solver then solves the equation of motion of the
+//! elements for the new state, from the prediction or from the modes' own motion. In the other
+//! steps the learned part stands, and the solver only follows it: velocity and inertia have to be
+//! those of the field, or the next correction would start with a jolt.
 
 use crate::clock::Instant;
 use std::sync::RwLock;
@@ -54,6 +60,8 @@ impl StepMaker {
         let input = Input {
             rest: &self.body.mesh.positions,
             contact: &states.incoming,
+            // A host's displacement is a new start, at rest: the state before is the same field,
+            // which makes the velocity zero.
             last: given.unwrap_or(&shared.last.field),
             before: given.unwrap_or(&shared.before.field),
             still: given.is_some(),
@@ -101,6 +109,8 @@ impl StepMaker {
     }
 
     /// The reaction of the last published state; false where it was not corrected.
+    ///
+    /// In `out [m,3]`, mN, one row for each contact node of the last step in the host's order.
     pub(super) fn corrected_reaction(&self, out: &mut [f32]) -> bool {
         let Some(corrected) = &self.corrected else {
             return false;

@@ -1,4 +1,10 @@
 //! How a scene corrects: what its options and the bundle ask for, and when a step has been corrected enough.
+//!
+//! The corrector holds what the implicit solver needs beside a step's input, and three limits of
+//! its iterations, of which the first that is reached ends them: a count, an estimate of the error,
+//! and a time. The estimate is the solver's own; by the bundle's calibration `c`, measured when it
+//! was made, the true error is about `c` times as large. So a target `t` is reached at the estimate
+//! `t / c`, and what a step reports is `c` times its estimate.
 
 use crate::clock::Instant;
 use std::sync::Arc;
@@ -53,6 +59,9 @@ struct Goal {
 
 impl Goal {
     /// The estimate that reaches the target, mm.
+    ///
+    /// 0 where there is no target: no estimate is below it, and the count alone ends the
+    /// iterations.
     fn estimate_mm(&self) -> f32 {
         self.target_mm / self.calibration
     }
@@ -112,6 +121,8 @@ impl Corrector {
         isa: Isa,
         pool: &Pool,
     ) -> Result<Option<Corrector>> {
+        // What the bundle recommends, as it was measured; absent in a bundle that was made without
+        // elements.
         let entry = model.manifest.corrections.as_ref();
         let own = OwnPace::new(model, options)?;
         // Three ways to say enough: a count, a target in mm, or a time; the first that is reached ends the iterations.
@@ -143,6 +154,7 @@ impl Corrector {
                 (most, target_mm, budget_us)
             }
         };
+        // A portable model promises equal bits on all machines, and a clock is different on each.
         if budget_us > 0 && isa.is_portable() {
             return Err(Error::Argument(
                 "corrections: a budget in µs makes steps depend on time, and the model was opened as portable; set 0, and a count or a target"
@@ -154,6 +166,8 @@ impl Corrector {
                 "corrections is {most}, must be 1 to {MOST_CORRECTIONS}"
             )));
         }
+        // The bundle's number is for its own length of step and for steps that go on to a target; a
+        // budget would be used up by the parts.
         let most_substeps = match options.substeps {
             0 => match entry {
                 Some(entry) if target_mm > 0.0 && budget_us == 0 && !own.has_step() => {
@@ -209,6 +223,8 @@ impl Corrector {
             held: &corrections.body.held,
         };
         let relaxes = model.manifest.relaxes();
+        // Without an entry nothing was measured, and the solver's own estimate stands for the
+        // error.
         let goal = Goal {
             most,
             target_mm,
@@ -219,6 +235,8 @@ impl Corrector {
         Ok(Some(Corrector {
             solver: memory::boxed(ImplicitSolver::new(context)?, WHAT)?,
             parts: StepParts {
+                // In most scenes no step is ever made in parts; what parts need is made with the
+                // first that is.
                 substeps: None,
                 most_substeps,
                 free_substeps: own.free_substeps(integrator.step_s, relaxes),
@@ -235,6 +253,9 @@ impl Corrector {
 }
 
 /// A scene that does not correct.
+///
+/// Options that only corrections would heed are refused: a host that sets them means something, and
+/// would otherwise look for its effect in vain.
 fn none(own: OwnPace, substeps: u32) -> Result<Option<Corrector>> {
     if substeps > 1 {
         return Err(Error::Argument(format!(
@@ -248,6 +269,7 @@ fn none(own: OwnPace, substeps: u32) -> Result<Option<Corrector>> {
 impl Corrector {
     /// When a step that began at `start` has been corrected enough.
     pub(super) fn enough(&self, start: Instant) -> Enough {
+        // The budget counts from where the step began, so that search and contact are in it.
         let budget_us = self.goal.budget_us;
         Enough {
             iterations: self.goal.most,
@@ -289,6 +311,7 @@ impl Corrector {
             stats.flags |= flag::FELL_BACK;
         }
         let limit = self.goal.error_limit_mm;
+        // NaN is larger than nothing; without its own question such a step would look good.
         if limit > 0.0 && (stats.error_mm > limit || stats.error_mm.is_nan()) {
             stats.flags |= flag::ERROR;
         }

@@ -30,6 +30,7 @@ impl Published {
     pub(super) fn rest(core: &Core) -> Result<Published> {
         let body = &core.maker.body;
         let count = body.mesh.node_count();
+        // Cubic sampling between frames needs one frame more than linear.
         let is_cubic = core.maker.options.cubic_sampling;
         Ok(Published {
             last: Frame::rest(count)?,
@@ -74,6 +75,7 @@ impl Core {
         // Beside its lists the topology makes many small parts.
         memory::probe(body.most_bytes(), SCENE)?;
         let change = operation(&mut body, &positions)?;
+        // The blade met no tissue: no core is made, and the body's number stays.
         if change == Change::default() {
             return Ok(change);
         }
@@ -95,6 +97,8 @@ impl Core {
                 (&own.last, &mut shown.last),
                 (&own.before, &mut shown.before),
             ];
+            // Equal displacement at a copy and its source, in all frames that are kept: nothing
+            // moves, and who interpolates between frames sees no jump.
             for (from, to) in pairs {
                 spread(&from.field, &mut to.field, source);
             }
@@ -108,6 +112,7 @@ impl Core {
         next.maker.follow(&self.maker, source)?;
         next.maker.loads.push(&next.maker.body, &change.pushes)?;
         let before = lock_read(published).body.number;
+        // Whoever reads meshes and frames apart tells by this number whether they belong together.
         shown.body.number = BodyNumber {
             change: before.change + 1,
             ..before
@@ -154,6 +159,7 @@ impl Core {
         if let (false, Some(prior)) = (self.hands.links.is_empty(), &body.model.prior) {
             let (corrections, samples) = (body.model.corrections()?, body.model.samples()?);
             let mut tissues = memory::room(self.hands.links.len(), SCENE)?;
+            // All of their tissue is made before the first hand is moved, since making it may fail.
             for _ in &self.hands.links {
                 let integrator = body.integrator;
                 tissues.push(HandTissue::new(prior, corrections, integrator, &samples)?);
@@ -169,6 +175,8 @@ impl Core {
     ///
     /// # Errors
     /// Those of handing over; nothing has then changed.
+    /// The line of the body's number is another then: a host that follows changes one by one has to
+    /// take the whole body anew.
     pub(super) fn put_back(
         &mut self,
         published: &RwLock<Published>,
@@ -229,6 +237,8 @@ impl StepMaker {
             let tools = (&before.tools, &before.body);
             self.tools.follow(tools, &self.body)?;
         }
+        // The scene is awake and counts as corrected: whatever predicts next has to start from the
+        // fields, since its own record is of another body.
         self.states.counters = Counters {
             sleeping: false,
             quiet: 0,

@@ -22,6 +22,8 @@ impl Corrector {
         source: impl Fn(usize) -> usize + Copy,
     ) -> Result<()> {
         let len = 3 * body.mesh.node_count();
+        // Velocity is a node's, and its copies have it as it is; inertia and loads are sums over
+        // the mass at a node, and are shared out below.
         let was = &old.solver.motion;
         // The pairs of before are of another body: the first step after a cut begins with none.
         let mut motion = Motion {
@@ -51,6 +53,8 @@ impl Corrector {
             let rows = field.chunks_exact_mut(3).enumerate();
             rows.for_each(|(node, row)| row.iter_mut().for_each(|x| *x *= part(node)));
         }
+        // Both bodies use the modes of the intact one, so that a set of modes that was chosen for
+        // the old body means the same in the new one.
         debug_assert_eq!(self.basis_starts.len(), old.basis_starts.len());
         let history = History {
             motion,
@@ -61,6 +65,7 @@ impl Corrector {
         };
         self.solver.restore(context, &history)?;
         follow_set(context, &old.solver, &mut self.solver)?;
+        // Only tissue that relaxes remembers stresses by element.
         if !self.solver.relaxes() {
             return Ok(());
         }

@@ -40,6 +40,8 @@ impl StepMaker {
         if self.corrected.is_none() {
             return self.drive_linear(published, near, stats);
         }
+        // A cut body has no learned motion, and ties pull without touching: each of their steps is
+        // made by the elements.
         if is_cut || problem.tied.has_any() {
             self.load(published, start, stats)?;
             return Ok(true);
@@ -61,6 +63,8 @@ impl StepMaker {
         // Nothing pushes: the model's own free motion, unless that runs into a tool.
         self.predict_and_decode(published, None, self.learns(), stats)?;
         self.correct(published, None, start, stats)?;
+        // The free motion is the cheaper step and right in most cases; only where it ends inside of
+        // a tool is it thrown away and made again with contact.
         let is_penetrated = {
             let shared = lock_read(published);
             let state = State {
@@ -138,6 +142,8 @@ impl StepMaker {
         // A substep is a step to the contact: speeds are those of its length.
         let made_of = report.substeps.max(1) as f32;
         let step_s = self.body.step_s() as f32 / made_of;
+        // The bundle's limits for tools hold for steps with as many corrections as they were
+        // measured with; with fewer they say nothing.
         let covered = corrected.covers_tools(&self.body.model);
         self.tools.used = covered.then(|| problem.ways.used(&problem.next, step_s));
         self.tools.report_depth(stats);
@@ -159,6 +165,8 @@ impl StepMaker {
         };
         if near {
             let mut watch = Stopwatch::start();
+            // The tissue's answer to a force at a sample, from the linear response: exact for small
+            // motions, and the same in each step.
             let compliance = Compliance::at_rest(prior, &self.body.held, None);
             let shared = lock_read(published);
             let state = State {

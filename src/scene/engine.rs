@@ -1,4 +1,10 @@
 //! What differs between the bundle kinds inside a step, behind one enum.
+//!
+//! Both kinds keep records: what a state is beside its field, such as latent tokens or block
+//! coordinates. There are three, of the state being made (next), the last published one, and the
+//! one before it; `commit` turns them round by swapping, without copies. A record and the frame of
+//! the same step belong together: any node of a published state can still be decoded from its
+//! record.
 
 use super::inputs::{Decode, Inputs, Which};
 use super::linear::Linear;
@@ -264,6 +270,8 @@ impl ReducedEngine {
     }
 }
 
+/// Adds `base [K,3]` to the field at some nodes: the others have not been decoded and are not to be
+/// read.
 fn add(base: &[f32], nodes: &[u32], field: &mut [f32]) {
     for &node in nodes {
         let at = 3 * node as usize;

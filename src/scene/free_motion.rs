@@ -11,6 +11,8 @@ use crate::kernels::project::project_field;
 
 impl ReducedEngine {
     /// A host's displacement `given [K,3]` sets the amplitudes of the last state and leaves the velocities.
+    ///
+    /// The learned part's own state becomes zero: it was not of this displacement.
     pub(super) fn set_amplitudes(&mut self, compute: Compute<'_>, given: &[f32]) -> Result<()> {
         let table = &self.linear.table;
         let Some(vibration) = &table.vibration else {
@@ -25,6 +27,11 @@ impl ReducedEngine {
     }
 
     /// The last state swings on from a corrected field `[K,3]` and the one before it, mm, with its velocity `[K,3]`, mm/s; the step in s.
+    ///
+    /// A field goes to block coordinates `q`, these to amplitudes `z`. Velocities of the record are
+    /// amplitudes a step, so rates per second are multiplied by the length of the step. The field
+    /// before comes first, since what is left of `q` after the modes is kept for both, and `q` and
+    /// `swing` must hold the last field's at the end.
     pub(super) fn swing_from(
         &mut self,
         compute: Compute<'_>,

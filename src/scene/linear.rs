@@ -1,4 +1,9 @@
 //! The linear response of a scene: the model's tables and the scene's own contact solve.
+//!
+//! The tables say how the body answers at rest to unit forces, in block coordinates `q`: the field
+//! of a node's block is `u = B q_b` with the block's basis `B`. A contact prescribes displacements
+//! at nodes; the solve finds the forces there that make them, and `q` is what these forces do
+//! everywhere.
 
 use std::sync::Arc;
 
@@ -68,6 +73,7 @@ impl Linear {
         let (place, velocity) = next.split_at_mut(vibration.count());
         self.solve
             .expand(isa, pool, vibration.force_to_mode(), place)?;
+        // By the step: the record has velocities as change of amplitude over one step.
         for ((velocity, now), before) in velocity.iter_mut().zip(place).zip(last) {
             *velocity = *now - before;
         }

@@ -1,4 +1,15 @@
 //! What a scene has for loads: those of the last published state, and of the one being made.
+//!
+//! The body bears the sum of dead loads (forces that keep their direction: gravity, forces on
+//! nodes, inertia of a support that moves) and of pressure, which follows the surface. In the step
+//! both go on a line from the last state's to the new one's, so each is kept twice. At node `i` of
+//! mass `m_i` the dead load is
+//!
+//! `f_i = m_i (g + a_i) + F_i + P_i`
+//!
+//! with gravity `g`, the acceleration `a_i` that the support's motion adds, the host's force `F_i`
+//! and what a blade has pushed, `P_i`. Masses are g, accelerations mm/s², so loads are µN; a host's
+//! forces come as mN.
 
 use topology::{Body, Push};
 
@@ -105,6 +116,7 @@ impl LoadState {
     }
 
     /// Takes what a blade has done to the tissue since the last step.
+    /// They are added to what stands there: several cuts may come between two steps. mN become µN.
     pub(super) fn push(&mut self, pushes: &[Push]) -> Result<()> {
         let pushed = &mut self.last.pushed;
         if pushed.is_empty() {
@@ -200,6 +212,8 @@ impl LoadState {
             if nodes.is_empty() {
                 next.pascal[faces.len()] += pressure.pascal;
             }
+            // Given but of no effect: a host that passes nodes inside of the body, or corners of
+            // different faces, would see no pressure and not know why.
             if is_on_none {
                 return Err(Error::Argument(format!(
                     "pressures[{index}]: no boundary triangle has all three corners among its {} nodes; pass the nodes of whole faces",
@@ -233,6 +247,9 @@ impl LoadState {
     }
 
     /// Whether gravity turns in the step being made.
+    ///
+    /// Gravity that stays as it is needs no answer of its own: the state that the step starts from
+    /// hangs under it already.
     pub(super) fn turns(&self) -> bool {
         self.last.gravity != self.next.gravity
     }
@@ -250,6 +267,7 @@ impl LoadState {
     }
 
     /// The state being made becomes the last.
+    /// What is left in `next` is of the step before; the next `take` writes all of it.
     pub(super) fn commit(&mut self) {
         std::mem::swap(&mut self.last, &mut self.next);
     }

@@ -1,4 +1,9 @@
 //! A scene takes the loads of its steps, and gives and takes those of saved states.
+//!
+//! A scene that never has loads keeps nothing of them: the state is made at the first step that has
+//! any, and lives as long as the scene, since tissue that has been loaded springs back for a while
+//! after. What the answer to gravity or to a moved group costs is made once for a model, at the
+//! first scene's first such step, and shared.
 
 use topology::Push;
 
@@ -43,6 +48,7 @@ impl SceneLoads {
         if self.state.is_none() && !loads.acts() {
             return Ok(false);
         }
+        // Asked before anything is made: a refused step leaves no state behind.
         let Some(v) = v else {
             return Err(Error::Unsupported(
                 "loads: the scene makes no corrections, in which gravity, forces and pressure act; set `corrections`".into(),
@@ -69,6 +75,9 @@ impl SceneLoads {
     }
 
     /// What the groups do that are let go, where another set of them was in the step before.
+    ///
+    /// Made again only when the set changes: it takes a solver of its own and products with the
+    /// whole body.
     fn prepare_let_go(&mut self, body: &SceneBody, machine: &Machine) -> Result<()> {
         let state = self.state.as_mut();
         let held = state.and_then(|loads| loads.held.as_deref_mut());

@@ -53,13 +53,18 @@ pub struct StepMaker {
     pub(super) states: StepStates,
 }
 
-/// Parts made by [`super::build`].
+/// Parts that `super::build` has made, of which a maker is put together.
 pub struct Parts {
+    /// Mesh, model and what is held.
     pub body: SceneBody,
+    /// As the host gave them.
     pub options: SceneOptions,
+    /// With the pool they make the machine of the scene.
     pub isa: Isa,
     pub pool: Pool,
+    /// The predictor of the bundle's kind.
     pub engine: Engine,
+    /// None where the options or the bundle ask for no corrections.
     pub corrected: Option<Box<Corrector>>,
     /// None: it is made here.
     pub envelope: Option<EnvelopeCheck>,

@@ -1,4 +1,8 @@
 //! What each node of a body bears of a host's forces, which are given by nodes and points of the intact mesh.
+//!
+//! A host knows the intact mesh alone. After a cut the tissue at a node's place may belong to one
+//! of its copies or to several; each takes its part by volume, and the parts of one node add up to
+//! 1, so that the whole force stays the host's.
 
 use topology::Body;
 
@@ -35,6 +39,8 @@ impl NodeForces {
             let changed = body.changed_elements();
             for node in changed.flat_map(|element| body.mesh().tet(element)) {
                 body.carriers(node, &mut parts)?;
+                // Stays zero unless the node is among its own carriers: then no tissue is left at
+                // it.
                 takes[node as usize] = 0.0;
                 for (node, part) in &parts {
                     takes[*node as usize] = *part as f32;

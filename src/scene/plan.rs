@@ -1,4 +1,8 @@
 //! Which nodes a step decodes: the host's region, the attached points' tetrahedra, and what the recurrence needs.
+//!
+//! What a step costs beyond its latent state is the nodes that are decoded, so a host that shows a
+//! part of the organ names it. A field `[K,3]` then holds the planned nodes only, and the others'
+//! rows are whatever was left there: nothing may read them.
 
 use crate::error::Result;
 use crate::kernels::rows::RowPlan;
@@ -21,6 +25,8 @@ impl NodePlan {
         node_count: usize,
         table: Option<&PriorTable>,
     ) -> Result<NodePlan> {
+        // Marks instead of sorting: lists overlap, and the order has to be ascending for the rows
+        // of the tables to be read from front to back.
         let mut wanted = memory::filled(node_count, false, WHAT)?;
         for &node in lists.iter().copied().flatten() {
             wanted[node as usize] = true;

@@ -197,8 +197,12 @@ impl AttachedPoints {
 
 /// Tetrahedra by the grid of their centres.
 struct TetFinder<'a> {
+    /// Positions and tetrahedra at rest.
     mesh: &'a Mesh,
+    /// Centres of the tetrahedra, numbered as these.
     centres: PointGrid,
+    /// The largest distance of a corner from its tetrahedron's centre, mm: what holds a point has
+    /// its centre no farther than this from it.
     reach: f64,
 }
 
@@ -225,11 +229,14 @@ impl<'a> TetFinder<'a> {
     /// The tetrahedron that holds `p`, or the one whose clamped combination comes closest to it.
     fn locate(&self, p: [f32; 3]) -> (u32, [f32; 4], f64) {
         let mut best: Option<(f64, u32, [f64; 4])> = None;
+        // A little more, so that rounding leaves out no tetrahedron that just reaches the point.
         let mut radius = self.reach * (1.0 + 1e-6);
         loop {
             self.centres.within(p, radius, |tet, _| {
                 let weights = clamp(self.barycentric(tet, p));
                 let miss = self.miss(tet, weights, p);
+                // Of equal misses the lowest number wins: on a shared face the order in which the
+                // grid is walked must not decide.
                 if best.is_none_or(|(d, t, _)| (miss, tet) < (d, t)) {
                     best = Some((miss, tet, weights));
                 }
@@ -237,6 +244,9 @@ impl<'a> TetFinder<'a> {
             if let Some((miss, tet, weights)) = best {
                 return (tet, weights.map(|w| w as f32), miss.sqrt());
             }
+            // Nothing within reach, so the point lies outside. The tetrahedron with the nearest
+            // centre is no farther than its farthest corner; one that comes closer has its centre
+            // within that distance plus the reach.
             let nearest = self.centres.nearest(p);
             let tet = &self.mesh.tets[4 * nearest as usize..4 * nearest as usize + 4];
             radius = tet
@@ -247,6 +257,9 @@ impl<'a> TetFinder<'a> {
         }
     }
 
+    /// `w` with `p = sum w_i x_i` and `sum w_i = 1`, by Cramer's rule: each weight is the volume of
+    /// the tetrahedron with `p` in the place of that corner over the whole volume. Outside some are
+    /// negative.
     fn barycentric(&self, tet: u32, p: [f32; 3]) -> [f64; 4] {
         let corners =
             [0, 1, 2, 3].map(|k| self.mesh.position(self.mesh.tets[4 * tet as usize + k]));
@@ -282,6 +295,9 @@ impl<'a> TetFinder<'a> {
     }
 }
 
+/// To a combination inside of the tetrahedron. For a point outside it is a close one and not the
+/// closest, which a projection onto faces and edges would give; points on a surface lie nearly
+/// inside, where the two agree.
 fn clamp(weights: [f64; 4]) -> [f64; 4] {
     let clamped = weights.map(|w| w.max(0.0));
     let sum: f64 = clamped.iter().sum();

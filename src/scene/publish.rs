@@ -68,6 +68,8 @@ impl Core {
         maker.tools.clear_forces();
         maker.tools.commit();
         maker.tools.publish(&maker.body, &mut lock_write(published));
+        // After so many steps every frame that exists, the spare one among them, is exactly rest,
+        // and there is nothing left to write. Only the time goes on.
         let frames = if maker.options.cubic_sampling { 4 } else { 3 };
         let counters = &mut maker.states.counters;
         if counters.rest_frames >= frames {
@@ -86,6 +88,9 @@ impl Core {
     }
 
     /// `next` becomes the last frame, the last the one before.
+    ///
+    /// All under one lock: a reader that interpolates between two frames never sees one of this
+    /// step and one of the step before the last.
     fn rotate(&mut self, published: &RwLock<Published>) {
         let maker = &mut self.maker;
         let mut shared = lock_write(published);

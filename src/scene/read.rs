@@ -72,7 +72,7 @@ impl Scene {
     /// Whether an output for the region or the points has `len` floats.
     ///
     /// # Errors
-    /// [`Error::Argument`]; [`Error::State`] where no points are attached.
+    /// [`crate::Error::Argument`]; [`crate::Error::State`] where no points are attached.
     pub(crate) fn check_len(&self, view: View, len: usize) -> Result<()> {
         lock_read(&self.shared.published).check_len(view, len)
     }

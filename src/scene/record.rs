@@ -67,7 +67,8 @@ impl Record {
     }
 }
 
-/// Numbers that are hashed at once.
+/// Numbers that are hashed at once. Their bytes go through a buffer on the stack, little-endian on
+/// every machine: a hash needs no memory.
 const MOST: usize = 256;
 
 /// Adds at most [`MOST`] numbers.
@@ -80,6 +81,9 @@ fn add(hash: &mut Sha256, values: &[f32]) {
 }
 
 /// SHA-256 of what an output would hold.
+///
+/// Of the bits of f32 in little-endian order, so that a replay that differs in the last bit of one
+/// node has another hash.
 fn digest(published: &RwLock<Published>) -> [u8; 32] {
     let shared = lock_read(published);
     let field = &shared.last.field;
@@ -98,8 +102,11 @@ fn digest(published: &RwLock<Published>) -> [u8; 32] {
 
 /// The line of a step.
 ///
+/// Dense fields are written as the rows in which any bit is set; what is the host's list already is
+/// borrowed.
+///
 /// # Errors
-/// [`Error::OutOfMemory`].
+/// [`crate::Error::OutOfMemory`].
 pub(super) fn step(recorder: &mut Recorder, input: &StepInput<'_>) -> Result<()> {
     let mut line = Step {
         displacement: input.displacement.map(Rows::of).transpose()?,

@@ -60,6 +60,7 @@ impl Core {
             Some(nodes) => NodePlan::new(&[nodes], count, table)?,
             None => NodePlan::all(count, table)?,
         };
+        // No attached points: only nodes are asked for.
         let points = AttachedPoints::default();
         self.maker
             .decode_published(published, Which::Last, &plan, &points, &mut [])?;
@@ -108,9 +109,11 @@ impl Core {
             memory::replace(&mut frame.field, &maker.states.next.field, WHAT)?;
             points.add_interpolated(1.0, &frame.field, &mut frame.points);
         }
+        // The third frame, that of the state being made, has as many points.
         let spare = memory::zeros(3 * points.len(), WHAT)?;
         let mut planned_tets = Vec::new();
         if maker.options.check_inversion {
+            // An element can be looked at for inversion only where all of its corners are decoded.
             let mut known = memory::filled(count, false, WHAT)?;
             plan.nodes()
                 .iter()

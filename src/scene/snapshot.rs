@@ -26,6 +26,8 @@ const MAGIC: &[u8; 8] = b"UPTSNAP\0";
 const VERSION: u32 = 25;
 /// Magic and version.
 const HEAD: usize = MAGIC.len() + 4;
+/// The checksum is no signature: it finds damage. A snapshot that was made to mislead is met by the
+/// checks of what it says.
 const DIGEST: usize = 32;
 
 /// Which scenes may take a state. What follows it is read only where this fits.
@@ -105,6 +107,8 @@ impl Core {
         let mut bytes = stored::write(&whole, HEAD, DIGEST)?;
         bytes[..MAGIC.len()].copy_from_slice(MAGIC);
         bytes[MAGIC.len()..HEAD].copy_from_slice(&VERSION.to_le_bytes());
+        // Room for head and digest was left when the state was written: nothing is copied to put
+        // them round it.
         let end = bytes.len() - DIGEST;
         let (body, digest) = bytes.split_at_mut(end);
         digest.copy_from_slice(&Sha256::digest(body));

@@ -13,6 +13,8 @@ use crate::error::{Error, Result};
 use crate::memory::HeldBytes;
 
 /// A support that goes farther in a step is put there, without inertia, mm and rad.
+/// In a step of 50 ms that would be 0.8 m/s: a host has set another scene up, and no organ is
+/// carried like this.
 const PUT_MM: f32 = 40.0;
 const PUT_RAD: f32 = 0.5;
 
@@ -79,16 +81,24 @@ fn combined(parts: [(f64, &Affine); 3]) -> Affine {
 /// Where the support is at the last end of a step, where it was at the one before, and how fast at both; poses as position and quaternion.
 #[derive(Clone, Copy, Debug, PartialEq, HeldBytes, Serialize, Deserialize)]
 pub(super) struct Carried {
+    /// Position, mm, and unit quaternion x, y, z, w, as the host gave them: what the next step's
+    /// way is measured from.
     pose: [f32; 7],
+    /// The pose as a matrix at the last end of a step, and at the one before it.
     places: [Affine; 2],
+    /// `V` at the same two ends, mm/s and 1/s.
     speeds: [Affine; 2],
 }
 
 /// What a step has of a support: the frame's rotation, velocity and acceleration at its end.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Carriage {
+    /// `[R c]` at the end of the step, whose `R`, transposed, turns the world's directions into the
+    /// frame.
     rotation: Affine,
+    /// `V`.
     velocity: Affine,
+    /// `W`.
     acceleration: Affine,
 }
 
@@ -119,6 +129,8 @@ impl Carried {
         let mut next = Carried::put(pose);
         let mut acceleration = [[0.0; 4]; 3];
         if let Some(last) = last.filter(|last| !last.leaps_to(pose)) {
+            // BDF2: `x' = (3 x_n - 4 x_(n-1) + x_(n-2)) / 2h`, and the acceleration by the same
+            // formula from velocities. It is the formula of the solver's own time step.
             let part = 0.5 / step_s;
             let derived = |now: &Affine, [last, before]: &[Affine; 2]| {
                 combined([(3.0 * part, now), (-4.0 * part, last), (part, before)])
@@ -150,7 +162,9 @@ impl Carried {
 pub(super) struct Borne {
     /// mm/s².
     at_origin: [f32; 3],
+    /// Column `k`: what a place 1 mm along axis `k` adds.
     of_place: [[f32; 3]; 3],
+    /// Column `k`: what a speed of 1 mm/s along axis `k` adds, Coriolis' part.
     of_velocity: [[f32; 3]; 3],
 }
 

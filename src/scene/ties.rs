@@ -66,6 +66,8 @@ pub(super) fn place(
     memory::fit(placed, given.len(), WHAT)?;
     placed.extend(given.iter().map(|tie| Placed {
         tie: *tie,
+        // The world's places go to the frame of the mesh, in which the body's displacements and
+        // tools are; without a support that moves the two frames are one.
         place: match (tie.end, &support) {
             (End::World(place), Some(support)) => support.inverse_transform_point(place),
             (End::World(place) | End::Support(place) | End::Tool { place, .. }, _) => place,

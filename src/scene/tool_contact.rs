@@ -1,4 +1,10 @@
 //! The contact of tools and ties in a scene: taken at the start of a step, published at its end, remembered in snapshots.
+//!
+//! The contact problem holds two accounts: `past`, what the last published state was made with
+//! (forces, grasps, ties that broke), and `next`, that of the step being made. A step starts from
+//! `past` and writes `next`; only when the state is published do they change places, so that a
+//! refused step leaves what was felt before. Forces are found again by sample and tool, which is
+//! why they are kept sorted.
 
 use std::sync::Arc;
 
@@ -185,6 +191,8 @@ impl ToolContact {
     }
 
     /// A copy of what contact remembers, where there is any.
+    ///
+    /// None is written where there is nothing, so that scenes without tools have short snapshots.
     pub fn saved(&self) -> Result<Option<Past>> {
         match self.past(false) {
             Some(past) if !past.is_empty() => past.copy().map(Some),

@@ -1,4 +1,9 @@
 //! Between decode and publish: the guard's verdict on the new state, and what its policy makes of a state that it refuses.
+//!
+//! The guard is the last thing between a solver or a network and a host's renderer: a state that is
+//! not finite, lies beyond the bundle's bound, moves farther than its cause explains, or turns
+//! elements inside out does not pass it unseen. What becomes of it is the host's policy: keep the
+//! last state and fail, blend (the linear response in its place), or only report.
 
 use std::sync::RwLock;
 

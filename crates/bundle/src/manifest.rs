@@ -95,7 +95,8 @@ pub struct CorrectionsEntry {
     /// Substeps at most of a step that tools drive, where it alone would err by more than the target; 1: none.
     #[serde(default = "no_substeps")]
     pub substeps: u32,
-    /// Estimated over measured error on held-out cases: what `SceneStats::error_mm` is multiplied by.
+    /// Measured over estimated error on held-out cases: the corrections' own estimate is multiplied
+    /// by it, and the product is `SceneStats::error_mm`.
     #[serde(default = "one")]
     pub calibration: f32,
     /// Length of step that suits scenes whose frames are presented, s; none: the bundle's.
