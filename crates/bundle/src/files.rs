@@ -1,4 +1,9 @@
 //! The files of a bundle: read once, size and SHA-256 checked against the manifest.
+//!
+//! Opening reads the manifest alone and asks for the size of each file it lists, which finds a copy
+//! that was cut short without reading it. The hash is checked where a file is read, so that no
+//! bytes reach a parser that are not those of the manifest. The manifest's own hash stands for the
+//! whole bundle: it holds all others.
 
 use std::path::{Path, PathBuf};
 
@@ -14,11 +19,13 @@ use field::error::{Error, Result};
 /// The manifest's file.
 const MANIFEST: &str = "bundle.json";
 /// Larger manifests are none.
+/// It is asked before the file is read: a wrong file of that name is not taken into memory first.
 const LARGEST_MANIFEST: u64 = 16 << 20;
 
 /// An opened bundle.
 #[derive(Debug)]
 pub struct BundleFiles {
+    /// Where the files lie.
     place: Place,
     /// The manifest, checked.
     pub manifest: Manifest,
@@ -50,6 +57,7 @@ impl BundleFiles {
             maker::name(error, maker::of(&fields).as_deref())
         })?;
         let made_with = maker::of(&serde_json::from_slice(&bytes).unwrap_or_default());
+        // From here on a file that the folder lacks is looked for in the body's.
         if let Some(body) = &manifest.body {
             place.take_body(body);
         }
@@ -92,6 +100,10 @@ impl BundleFiles {
     }
 
     /// The bytes of a listed file, hash checked.
+    ///
+    /// # Errors
+    /// [`Error::Bundle`] for a file that is not listed or has another hash, [`Error::Io`] where it
+    /// cannot be read.
     pub fn read(&self, name: &str) -> Result<Vec<u8>> {
         let entry = self.manifest.files.get(name).ok_or_else(|| {
             Error::bundle(

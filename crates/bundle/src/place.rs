@@ -92,6 +92,7 @@ impl Place {
 }
 
 /// The folder `name` beside `own`.
+/// By the path's own last part where it has one; `.` and `..` have none, and are left through `..`.
 fn beside(own: &Path, name: &str) -> PathBuf {
     match own.file_name() {
         Some(_) => own.with_file_name(name),
@@ -100,6 +101,9 @@ fn beside(own: &Path, name: &str) -> PathBuf {
 }
 
 /// A file of the bundle's own folder, and where that has nothing of this name, of the body's.
+///
+/// Asked without following links: a broken link in the bundle's folder is a fault of this bundle,
+/// and not a reason to take the body's file.
 fn within(own: &Path, body: Option<&Path>, name: &str) -> PathBuf {
     let path = own.join(name);
     match body {
@@ -114,6 +118,7 @@ pub fn file_of(bundle: &Path, body: Option<&str>, name: &str) -> PathBuf {
     within(bundle, body.as_deref(), name)
 }
 
+/// Of a bundle in memory.
 fn not_given(name: &str) -> Error {
     Error::io(name, "is not among the files that were given")
 }
@@ -137,10 +142,13 @@ pub fn read_regular(path: &Path) -> Result<Vec<u8>> {
         options.custom_flags(libc::O_NONBLOCK);
     }
     let mut file = options.open(path).map_err(failed)?;
+    // Asked of the open file and not of its path, under which another file may lie by now.
     let found = file.metadata().map_err(failed)?;
     if !found.is_file() {
         return Err(not_regular(path));
     }
+    // Room is asked for first: a size that no memory has is an error, and reading then does not
+    // grow the list.
     let size = usize::try_from(found.len()).unwrap_or(usize::MAX);
     let mut bytes = memory::room(size, &format!("the file {}", path.display()))?;
     file.read_to_end(&mut bytes).map_err(|error| {

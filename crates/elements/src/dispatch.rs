@@ -4,6 +4,7 @@
 //! `target_feature`. Those functions are kept as pointers ([`Kernels`]), chosen once when a body is
 //! packed, so that no call looks at the processor again. What differs by law is decided here, once
 //! a chunk, outside of all loops.
+
 #![allow(
     clippy::undocumented_unsafe_blocks,
     reason = "one contract for all: each function is chosen where the machine has its instruction set"
@@ -143,6 +144,8 @@ unsafe fn forces_by_stretches<L: Eigenvalues>(
 }
 
 /// Adds the volumes of all clusters of a chunk.
+/// A law in principal stretches is given displacements and has gradients beside its clusters; the
+/// others are given positions.
 #[inline(always)]
 unsafe fn all_volumes<L: NodeLanes>(
     partition: &Partition,
@@ -188,6 +191,8 @@ unsafe fn all_histories<L: Eigenvalues>(
         let (octahedra, pairs, singles) = partition.clusters(chunk);
         let (a, b, c) = partition.gradients(chunk);
         let (d, e, f) = partition.directions(chunk);
+        // Numbers of one batch: for each lane six of the stress of the state before, and six of
+        // each branch.
         let batch = (step.count + 1) * SIX * WIDTH;
         let of_octahedra = of_octahedra.add(chunk.octahedra.start * 4 * batch);
         let of_pairs = of_pairs.add(chunk.pairs.start * 2 * batch);
@@ -207,6 +212,8 @@ unsafe fn all_histories<L: Eigenvalues>(
 }
 
 /// Compiles the kernels for one `Lanes` type, with [`Eigenvalues::APART`], under the given target features.
+/// The function of the eigenvalues is not inlined: it is long, and each of the three sizes of
+/// clusters calls it in two kernels.
 macro_rules! kernels {
     ($module:ident, $lanes:ty, $apart:literal $(, $feature:literal)?) => {
         mod $module {

@@ -1,4 +1,8 @@
 //! What fibres add to the stress, the energy and the tangent of their matrix, in f64 ([`crate::Fibred`] has the equations).
+//!
+//! With `C = F^T F` and the direction `a` at rest, `x = a . C a - a . a` is zero at rest and
+//! positive where the fibres are longer. Their energy density `psi(x)` is zero for `x <= 0`: fibres
+//! pull and do not push. Where an element has no direction, `a = 0`, nothing is added.
 
 use crate::laws::Fibred;
 use crate::vector::dot;
@@ -51,6 +55,9 @@ pub(crate) fn energy(fibres: &Fibred, own: Option<Stretched>) -> f64 {
 }
 
 /// Adds `2 psi' delta_ik a_j a_l + 4 psi'' (F a)_i a_j (F a)_k a_l`, Pa, in row `3 i + j`, column `3 k + l`.
+///
+/// The first part is the pull, which turns with the tissue; the second is how the pull rises with
+/// the stretch.
 pub(crate) fn add_tangent(
     fibres: &Fibred,
     own: Option<Stretched>,
@@ -74,7 +81,11 @@ pub(crate) fn add_tangent(
     }
 }
 
-/// Adds the stiffness that fibres give an element between its corners, times `weight`, µN/mm.
+/// Adds the stiffness that fibres give an element of this `volume` between its corners, µN/mm.
+///
+/// The tangent of [`add_tangent`], contracted with the gradients of two corners' shape functions:
+/// of `g_m` only `g_m . a` is left. `gradients` are 1/mm at rest, `volume` mm³; rows and columns
+/// are `3 corner + axis`.
 pub(crate) fn add_stiffness(
     fibres: &Fibred,
     own: Option<Stretched>,

@@ -117,6 +117,11 @@ by_isa! {
         = columns_body, columns_scalar;
 }
 
+/// The same a register at a time. Every column is one sum over the rows in their order, whichever
+/// tile it falls into: tiles of eight registers, then the rest.
+///
+/// # Safety
+/// The instruction set of `V` is there; the rows are checked here.
 #[inline(always)]
 unsafe fn columns_body<V: DenseLanes>(
     table: &[impl Number],
@@ -161,6 +166,11 @@ unsafe fn columns_body<V: DenseLanes>(
     }
 }
 
+/// `M` registers of [`columns_body`], from column `column` on: their sums stay in registers while
+/// all rows pass.
+///
+/// # Safety
+/// The instruction set of `V` is there; every row has these columns.
 #[inline(always)]
 unsafe fn register_tile<V: DenseLanes, const M: usize>(
     table: *const impl Number,

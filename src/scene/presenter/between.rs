@@ -1,7 +1,8 @@
 //! The tissue a time `tau` after a step `n`: `u = u_n + tau v_n + A_k(tau) B^T (f - f_n)`.
 //!
-//! The last velocities go on, as far as the tools do ([`super::along`]), and contact is solved at the instruments' poses with the compliance of
-//! that time, `kappa = 9/(4 tau²) + 3 alpha/(2 tau)`.
+//! The last velocities go on, as far as the tools do ([`super::extrapolation`]), and contact is
+//! solved at the instruments' poses with the compliance of that time,
+//! `kappa = 9/(4 tau²) + 3 alpha/(2 tau)`.
 
 use std::mem::swap;
 use std::sync::Arc;

@@ -90,6 +90,8 @@ pub unsafe fn add_forces_of_stretches<L: Eigenvalues, const NODES: usize, const 
         for (cluster, gradients) in clusters.iter().zip(gradients) {
             for first in (0..WIDTH).step_by(L::COUNT) {
                 let (edge, fourth) = edges::<L, NODES, TETS>(cluster, first, nodes);
+                // The dilatation of an element as the mean over its corners, whose values the pass
+                // over volumes has made.
                 let mut mean = [zero; TETS];
                 if averaged {
                     for tet in 0..TETS {
@@ -167,6 +169,8 @@ pub unsafe fn add_volumes_of_stretches<L: NodeLanes, const NODES: usize, const T
         for (cluster, gradients) in clusters.iter().zip(gradients) {
             for first in (0..WIDTH).step_by(L::COUNT) {
                 let (edge, _) = edges::<L, NODES, TETS>(cluster, first, nodes);
+                // Each corner gets the whole volume, times the bulk modulus: the dilatation of a
+                // node is made of the sum over its elements.
                 let mut sum = [zero; NODES];
                 for tet in 0..TETS {
                     let [a, b, c] = corners::<NODES>(tet);

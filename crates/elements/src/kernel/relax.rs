@@ -22,6 +22,9 @@ const LINE: usize = 64;
 const LEAST_SQUARE: f32 = 1e-4;
 
 /// `C^-1 T` from `cof F`, `det F` and `T`, Pa.
+///
+/// `C^-1 = (cof F)^T cof F / J²`, so that no matrix is inverted: of `J²` the least value keeps a
+/// flat element finite.
 #[inline(always)]
 unsafe fn second_piola<L: NodeLanes>(cofactor: &[[L; 3]; 3], det: L, t: &[L; 6]) -> [L; 6] {
     unsafe {
@@ -41,6 +44,8 @@ unsafe fn second_piola<L: NodeLanes>(cofactor: &[[L; 3]; 3], det: L, t: &[L; 6])
 }
 
 /// Adds the stress of fibres, `2 psi' a (x) a`, Pa.
+///
+/// `F a = a + H a`: from `H` a small stretch keeps its digits in f32.
 #[inline(always)]
 unsafe fn add_fibres<L: NodeLanes, const TETS: usize>(
     fibres: &LaneFibres,
@@ -77,11 +82,11 @@ type Batches<'a, const NODES: usize, const TETS: usize> = (
 );
 
 /// Takes the stresses at displacements (mm) into the `history` of the clusters, and adds the forces (µN) of the first `ROWS` rows of weights.
-#[inline(always)]
 ///
 /// `history` holds `[batch, tet, count + 1, 6, 16]` numbers, Pa: of each tetrahedron `S_iso` of the
 /// state before, then the `q_i`. They are read and written in one pass, so a call takes the history
 /// exactly one state further and must not be repeated for the same state.
+#[inline(always)]
 pub unsafe fn relax<L: Eigenvalues, const NODES: usize, const TETS: usize, const ROWS: usize>(
     (law, fibres): (&LaneTerms, Option<&LaneFibres>),
     step: &StressStep,

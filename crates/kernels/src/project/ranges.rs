@@ -107,6 +107,11 @@ unsafe fn range_body<V: DenseLanes>(
 }
 
 /// `N` vectors of [`range_body`].
+///
+/// Four rows at a time: with three vectors these are twelve sums, which stay in registers together
+/// with the row and the vectors. Where fewer than four rows are left the last is computed again,
+/// and its copies are dropped: there is one way of summing for every row, whatever its place in the
+/// list.
 #[inline(always)]
 unsafe fn range_rows<V: DenseLanes, const N: usize>(
     table: &[impl Number],

@@ -22,6 +22,7 @@ impl RowPlan {
         self.locals.clear();
         self.outputs.clear();
         self.output_rows = rows;
+        // Room for all rows at once, so that a plan of the same size later asks for no memory.
         memory::fit(&mut self.locals, rows, WHAT)?;
         memory::fit(&mut self.outputs, rows, WHAT)?;
         self.places.clear();
@@ -71,6 +72,7 @@ pub fn project_rows(isa: Isa, basis: &BlockBasis<'_>, plan: &RowPlan, r: &[f32],
     let ranks = basis.rank_offsets;
     assert_eq!(q.len(), ranks[ranks.len() - 1] as usize, "q must be [Q]");
     assert_eq!(r.len(), 3 * plan.output_rows, "r must be [rows, 3]");
+    // Ranks are multiples of eight and not of sixteen.
     let isa = if isa == Isa::Avx512 { Isa::Avx2 } else { isa };
     for run in &plan.runs {
         let (k, items) = (run.block as usize, run.start as usize..run.end as usize);
@@ -109,6 +111,7 @@ pub fn project_products(
         "q must be [9,Q]"
     );
     let isa = if isa == Isa::Avx512 { Isa::Avx2 } else { isa };
+    // By row and not by run: a few rows are looked up where they lie.
     let table = (plan.places.as_slice(), plan.basis_offsets.as_slice());
     match basis.basis {
         Stored::F32(basis) => products_f32(isa, basis, table, ranks, of_rows, q),
@@ -177,6 +180,10 @@ unsafe fn products_body<V: DenseLanes>(
 }
 
 /// Calls with each row of the basis, each component of its vector and the coordinates that their product goes to.
+///
+/// The field `e_i w_j` of a row is zero but for component `i`, so that each of the nine takes one
+/// row of the basis times one number: `3 i + j` names the field, and three fields share a row while
+/// it is in the cache.
 #[inline(always)]
 fn each_product<T: Number>(
     basis: &[T],
@@ -201,6 +208,10 @@ fn each_product<T: Number>(
 }
 
 /// `q += U^T r` of the copies of nodes in block `k`, whose rows lie at `rows`; `r` by node.
+///
+/// Behind a block's own nodes its list has the copies that cuts have made of them; a copy moves as
+/// its parent does, so its force counts on the parent's row. Own nodes come first and copies after
+/// them: the order of a sum decides its bits.
 pub(crate) fn add_copies(
     isa: Isa,
     basis: &BlockBasis<'_>,
@@ -313,6 +324,7 @@ unsafe fn add_tile<V: DenseLanes, const M: usize>(
         for (&local, &output) in locals.iter().zip(outputs) {
             let mut row = basis.wrapping_add(3 * local as usize * rank);
             let forces = &r[3 * output as usize..3 * output as usize + 3];
+            // Its products would add zeros, and a residual near tools is zero at most nodes.
             if *forces == [0.0; 3] {
                 continue;
             }

@@ -1,4 +1,9 @@
 //! Corners that lie on an edge of another polygon become corners of that one, too: the surface is closed vertex by vertex.
+//!
+//! Polygons of neighbouring cells share edges but not always corners: where a cut crosses one cell
+//! and not the other, a corner lies in the middle of the other's edge. Drawn so, the two sides come
+//! apart there as soon as the corner moves (a T-junction). A corner is a weighted sum of nodes, so
+//! "on the edge" is asked in weights, which do not depend on how the tissue is deformed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,6 +20,8 @@ impl Surface {
         body: &Body,
         pieces: &mut Vec<Piece>,
     ) -> Result<BTreeSet<(u32, u8)>, TopologyError> {
+        // All corners of pieces by the nodes that they lie on. Ordered, so that the same body gives
+        // the same surface.
         let mut used: BTreeMap<[u32; 4], BTreeSet<u32>> = BTreeMap::new();
         for corner in pieces.iter().flat_map(|piece| &piece.corners) {
             let nodes = self.vertices[*corner as usize].nodes;
@@ -121,6 +128,7 @@ impl Surface {
                 }
             }
         }
+        // By the way from the first corner; at equal places by number, so that the order is one.
         found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         found.into_iter().map(|(_, corner)| corner).collect()
     }

@@ -45,6 +45,9 @@ impl FarField {
         lost: &LostElements,
     ) -> Result<FarField> {
         let forces = &body.forces;
+        // The cut body's chunks are those of the intact one, without the elements that changed, and
+        // behind them chunks of what these became; `parents` says of which chunk each of the latter
+        // is, ascending.
         let (count, parents) = (self.volumes.len(), forces.cut_chunks());
         let mut own = FarField {
             moduli: self.moduli,
@@ -70,6 +73,7 @@ impl FarField {
             packed.boxes.push(bounds(mesh, forces.chunk_nodes(chunk)));
         }
         own.elements_at.extend_from_slice(&self.elements_at);
+        // A copy of a node begins with none; what became of the changed elements is counted below.
         own.elements_at.resize(mesh.node_count(), 0);
         for node in gone.iter().flat_map(|(_, corners)| corners) {
             own.elements_at[*node as usize] -= 1;

@@ -39,6 +39,8 @@ pub(in crate::corrections) struct Pairs {
 /// What the second recursion needs of the first.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::corrections) struct Recursion {
+    /// Slots of the pairs, oldest first, and how many: those of the first recursion, which the
+    /// second has to use as well.
     used: ([usize; PAIRS], usize),
     /// `alpha_i` of the first recursion, by the place in `used`.
     alpha: [f64; PAIRS],
@@ -112,6 +114,9 @@ impl Pairs {
     }
 
     /// Lays out all pairs for a near set.
+    ///
+    /// Only pairs that are not laid out yet are touched. Afterwards every pair in the order has
+    /// `s . y > 0` over what is near now, without which the recursions would not give a descent.
     pub fn lay_out(&mut self, env: Env<'_>, near: &NearSet, room: &mut Room) -> Result<()> {
         let (mut is_new, mut listed) = (false, None);
         for at in 0..self.order.len() {
@@ -209,6 +214,8 @@ impl Pairs {
         (step, change): (&Step, &Change),
     ) -> Result<()> {
         if self.order.len() == PAIRS {
+            // Its slot is free again only when no published list has it: a refused step goes back
+            // to that list.
             self.order.remove(0);
         }
         // Fewer than PAIRS are in use, and at most PAIRS are published.
@@ -227,6 +234,11 @@ impl Pairs {
     }
 
     /// The first recursion: `r` becomes `r - sum_i alpha_i y_i`.
+    ///
+    /// `alpha_i = s_i . r / (s_i . y_i)`, from the newest pair to the oldest, each of the residual
+    /// that the newer ones have left. The products with `r` are made at once; what the newer pairs
+    /// take off is known from the products `s_i . y_j` (Nocedal and Wright, Numerical Optimization,
+    /// algorithm 7.4).
     pub fn descend(&self, isa: Isa, r: &mut Change) -> Recursion {
         let used = self.used();
         let count = used.1;
@@ -243,6 +255,9 @@ impl Pairs {
     }
 
     /// The second recursion: `z` becomes `-(z + sum_i w_i s_i)`.
+    ///
+    /// `w_i = alpha_i - y_i . z / (s_i . y_i)`, from the oldest to the newest; the minus makes it a
+    /// step of descent.
     pub fn ascend(&self, isa: Isa, recursion: Recursion, z: &mut Step) {
         let (used, count) = (recursion.used, recursion.used.1);
         let mut products = [0.0; PAIRS];
