@@ -1,5 +1,11 @@
 //! Live haptics objects, found without a lock: a fixed table whose places are taken and given back by one atomic exchange, so that a thread that
 //! renders never waits for one that makes or destroys another.
+//!
+//! A place's state is one word: free, or the handle of its object with two bits beside it. Whoever
+//! exchanges the plain handle for the busy one has the object until it stores the state again;
+//! everyone else is told that it is busy, and nobody waits. Acquire at the exchange and Release at
+//! the store hand the object from thread to thread. Handles are never used twice, so an old one
+//! finds no place, whatever lies there now.
 
 use std::cell::UnsafeCell;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -23,6 +29,7 @@ const BROKEN: usize = 1 << (usize::BITS - 2);
 struct Place {
     /// [`FREE`], or a handle with what it does.
     state: AtomicUsize,
+    /// The object; none in a free place, and for a moment while one is added or ended.
     hand: UnsafeCell<Option<Box<Haptics>>>,
 }
 
@@ -52,6 +59,8 @@ impl Taken {
 
 impl Drop for Taken {
     fn drop(&mut self) {
+        // A panic went through a call on the object, which may be half changed: it is only good for
+        // being destroyed.
         let broken = if std::thread::panicking() { BROKEN } else { 0 };
         let state = match self.then {
             FREE => FREE,
@@ -61,11 +70,17 @@ impl Drop for Taken {
     }
 }
 
+/// The place of an object, and whether it is broken.
+///
+/// # Errors
+/// Busy where another thread is in a call, and what [`refuse_hand`] says of a handle that is none
+/// of a living object.
 fn take(handle: usize) -> Result<(Taken, bool), Failure> {
     if handle & (BUSY | BROKEN) != 0 || handle == FREE {
         return refuse_hand(handle);
     }
     for place in &PLACES {
+        // Only looked at to find the place; the exchange below is what counts.
         let state = place.state.load(Ordering::Relaxed);
         if state & !(BUSY | BROKEN) != handle {
             continue;

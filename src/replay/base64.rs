@@ -1,4 +1,7 @@
 //! Bytes of a snapshot as text: base64 of RFC 4648, with padding.
+//!
+//! A line of a recording is JSON, which has no bytes. The text is written straight into the line,
+//! without a string of its own: a snapshot of a large scene has megabytes.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -25,6 +28,7 @@ impl<'de> Deserialize<'de> for Bytes<'_> {
     }
 }
 
+/// Reads them. A line is read from a string that may be gone afterwards, so the bytes are owned.
 struct Text;
 
 impl Visitor<'_> for Text {

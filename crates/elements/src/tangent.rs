@@ -15,6 +15,7 @@ use crate::vector::{cross, dot};
 /// Eigenvalues of `C` closer than this, relative, have a derivative in place of a difference.
 const COINCIDENT: f64 = 1e-6;
 /// Least eigenvalue of `C`.
+/// An element that is flat to this degree has no stretch to take the logarithm of.
 const LEAST: f64 = 1e-12;
 
 type Matrix = [[f64; 3]; 3];
@@ -44,6 +45,8 @@ fn tangent_with(state: &Deformation, moduli: Moduli, turning: f64) -> [[f64; 9];
     for i in 0..3 {
         for j in 0..3 {
             let gap = values[i] - values[j];
+            // The divided difference of the stresses by eigenvalue. Where two eigenvalues coincide
+            // its limit is the derivative, `d(ln lambda) / dl = 1 / (2 l)`.
             let middle = 0.5 * (values[i] + values[j]);
             slopes[i][j] = if gap.abs() < COINCIDENT * middle {
                 moduli.shear_pa * law.rise(logarithm(middle)) / (2.0 * middle)

@@ -67,6 +67,7 @@ pub(super) fn response(
     let count = kept.iter().map(|&eights| 24 * usize::from(eights)).sum();
     let mut values = memory::filled(count, f16::ZERO, WHAT)?;
     let mut to = values.chunks_exact_mut(GROUP);
+    // Scratch for one node, with its room once.
     let mut starts = memory::room(groups, WHAT)?;
     for (node, &step) in steps.iter().enumerate() {
         // Where each group's codes start among the node's: the three rows of a group follow each other.

@@ -1,4 +1,7 @@
 //! From a latent state to displacements: the decoder at nodes of the mesh, all or at anchors, and at any other points.
+//!
+//! The three records are read by the name of a state, so that a node of a published state can be
+//! decoded when a host asks for it, and not only in the step that made it.
 
 use super::decoders::{Decoders, decode_resident, decode_tiles, take_rows};
 use std::sync::Arc;
@@ -28,6 +31,8 @@ impl UptEngine {
         let Some(table) = &tables.anchors else {
             return self.decode_nodes(compute, which, nodes, out);
         };
+        // Taken out while the engine is borrowed for decoding, and put back whether or not that
+        // succeeded: its buffers have their room.
         let mut anchors = std::mem::take(&mut self.anchors);
         let (needed, field) = anchors.needed(table, nodes);
         let done = self.decode_nodes(compute, which, needed, field);
@@ -77,6 +82,8 @@ impl UptEngine {
             tokens,
             scratch,
         } = &mut self.native;
+        // Packed for the kernel in each call: the keys and values are another record's each time,
+        // and few beside the nodes.
         tokens.set(*precision, &record.keys, &record.values);
         let what = Decoding {
             decoder: &self.kind.decoder,

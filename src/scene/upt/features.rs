@@ -1,4 +1,10 @@
 //! The encoder's node features of kind `upt`, normalised as the bundle says: `[encode_nodes, f]`.
+//!
+//! A feature `x` becomes `(x - mean) / std` by axis, with the mean and deviation of the training
+//! set; the flag of contact stays 0 or 1. Rows are by place in `encode_nodes`, and columns follow
+//! the manifest's list of features: three for a vector, one for the flag. Every number is written
+//! in each step, those of nodes without contact as well, since the rows are an input that stays
+//! bound.
 
 use std::hint::black_box;
 
@@ -39,6 +45,7 @@ pub(super) fn fill_features(
                 }
             }
             None if feature == Feature::Collision => {
+                // No contact is a push of zero, which the normalisation moves.
                 let zero = [0, 1, 2].map(|axis| (0.0 - mean[axis]) * inverse[axis]);
                 all.for_each(|row| row[column..column + 3].copy_from_slice(&zero));
             }
@@ -48,6 +55,7 @@ pub(super) fn fill_features(
             let contact = input.contact;
             for (&node, c) in contact.nodes.iter().zip(contact.vectors.chunks_exact(3)) {
                 let row = tables.row_of_node[node as usize];
+                // A contact node beyond the graph: no supernode hears of it.
                 if row == u32::MAX {
                     continue;
                 }

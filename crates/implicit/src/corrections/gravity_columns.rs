@@ -121,6 +121,7 @@ pub(super) fn add_gravity(
             u.iter_mut().zip(from).for_each(|(u, w)| *u += change * w);
         }
     }
+    // What is held stays where it is led, whatever the columns say there.
     context.held.put(u);
     Ok(())
 }
@@ -131,6 +132,8 @@ impl Corrections {
         if let Some(response) = self.gravity.get() {
             return Ok(response);
         }
+        // Two scenes may make it at once; the first to be done is kept, and both have the same
+        // bits.
         let made = GravityResponse::new(context)?;
         Ok(self.gravity.get_or_init(|| made))
     }

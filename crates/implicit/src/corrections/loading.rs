@@ -1,4 +1,9 @@
 //! Loads in a step: off the drift before it, off the inertia that it leaves.
+//!
+//! In `F(u) = f_int(u) + M (a + alpha v) - p` all that the iterations do not change is the drift;
+//! the load `p` at the end of the step is subtracted from it once, before them. When the step is
+//! made the load is subtracted from the inertia that its state leaves, so that the next step finds
+//! the two in balance. What relaxing tissue remembers pushes in the same way.
 
 use super::balance::Balance;
 use super::input::Input;
