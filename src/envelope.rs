@@ -47,8 +47,8 @@ impl EnvelopeCheck {
     /// Surface adjacency of a mesh.
     pub fn new(mesh: &Mesh) -> Result<EnvelopeCheck> {
         const WHAT: &str = "the surface's edges";
-        let mut edges: Vec<(u32, u32)> = memory::room(2 * mesh.surface_faces.len(), WHAT)?;
-        for f in mesh.surface_faces.chunks_exact(3) {
+        let mut edges: Vec<(u32, u32)> = memory::room(2 * mesh.surface.faces.len(), WHAT)?;
+        for f in mesh.surface.faces.chunks_exact(3) {
             for (a, b) in [(f[0], f[1]), (f[1], f[2]), (f[2], f[0])] {
                 edges.extend([(a, b), (b, a)]);
             }
@@ -64,7 +64,7 @@ impl EnvelopeCheck {
             offsets[i + 1] += offsets[i];
         }
         let mut in_domain = memory::filled(count, false, WHAT)?;
-        for &node in &mesh.domain_nodes {
+        for &node in &mesh.domain.nodes {
             in_domain[node as usize] = true;
         }
         Ok(EnvelopeCheck {
@@ -91,7 +91,7 @@ impl EnvelopeCheck {
         offsets.extend_from_slice(&self.offsets[..=intact]);
         offsets.resize(count + 1, offsets[intact]);
         let mut in_domain = memory::filled(count, false, WHAT)?;
-        for &node in &mesh.domain_nodes {
+        for &node in &mesh.domain.nodes {
             in_domain[node as usize] = true;
         }
         Ok(EnvelopeCheck {
@@ -197,7 +197,7 @@ impl EnvelopeCheck {
             self.stack.push(start);
             while let Some(node) = self.stack.pop() {
                 let node = node as usize;
-                area += mesh.node_area[node];
+                area += mesh.surface.node_area[node];
                 for &other in
                     &self.neighbours[self.offsets[node] as usize..self.offsets[node + 1] as usize]
                 {

@@ -81,7 +81,7 @@ impl SupernodeGraph {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn of_mesh(mesh: &Mesh, settings: &Graph) -> Result<SupernodeGraph> {
-        SupernodeGraph::new(&mesh.positions, &mesh.domain_nodes, settings)
+        SupernodeGraph::new(&mesh.positions, &mesh.domain.nodes, settings)
     }
 
     /// Supernodes and all their neighbours, ascending: the nodes whose state the recurrence needs.

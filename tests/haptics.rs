@@ -22,12 +22,12 @@ fn corrected() -> SceneOptions {
 fn top(scene: &Scene) -> [f32; 3] {
     let mesh = scene.mesh();
     let place = |node: u32| [0, 1, 2].map(|axis| mesh.positions[3 * node as usize + axis]);
-    let count = mesh.domain_nodes.len() as f32;
+    let count = mesh.domain.nodes.len() as f32;
     let middle = [0, 1].map(|axis| {
-        let along = mesh.domain_nodes.iter().map(|&node| place(node)[axis]);
+        let along = mesh.domain.nodes.iter().map(|&node| place(node)[axis]);
         along.sum::<f32>() / count
     });
-    let nearest = mesh.domain_nodes.iter().min_by(|a, b| {
+    let nearest = mesh.domain.nodes.iter().min_by(|a, b| {
         let far = |node: u32| {
             (0..2)
                 .map(|k| (place(node)[k] - middle[k]).powi(2))

@@ -13,7 +13,7 @@ fn damped(damping_per_s: f64) -> SceneOptions {
 
 /// A node of the domain is pulled by 1 mm within 0.2 s, held to the step 8, and let go.
 fn step(scene: &Scene, index: usize, u: &mut [f32]) {
-    let node = scene.mesh().domain_nodes[0];
+    let node = scene.mesh().domain.nodes[0];
     let vector = [0.0, 0.0, 0.25 * index.min(4) as f32];
     let (nodes, vectors): (&[u32], &[f32]) = match index <= 8 {
         true => (&[node], &vector),

@@ -20,8 +20,8 @@ fn stepping(step_s: f64) -> SceneOptions {
 fn ball(scene: &Scene, depth: f64) -> Vec<Tool> {
     let mesh = scene.mesh();
     let place = |node: u32| [0, 1, 2].map(|axis| mesh.positions[3 * node as usize + axis]);
-    let nodes = || mesh.domain_nodes.iter().map(|&node| place(node));
-    let count = mesh.domain_nodes.len() as f32;
+    let nodes = || mesh.domain.nodes.iter().map(|&node| place(node));
+    let count = mesh.domain.nodes.len() as f32;
     let middle = [0, 1].map(|axis| nodes().map(|at| at[axis]).sum::<f32>() / count);
     let far = |at: &[f32; 3]| (0..2).map(|k| (at[k] - middle[k]).powi(2)).sum::<f32>();
     let [x, y, z] = nodes().min_by(|a, b| far(a).total_cmp(&far(b))).unwrap();
@@ -205,7 +205,7 @@ fn threads_change_no_bit() {
 fn a_collision_field_drives_it_too() {
     let model = model("tiny-corrected");
     let scene = scene(&model, &stepping(0.01));
-    let node = scene.mesh().domain_nodes[0];
+    let node = scene.mesh().domain.nodes[0];
     let mut u = vec![0.0; 3 * scene.node_count()];
     for index in 1..=60 {
         let pushed = [0.0, 0.0, -0.05 * index.min(20) as f32];
@@ -269,7 +269,7 @@ fn a_fine_mesh_comes_to_rest_in_short_steps() {
 #[test]
 fn what_is_inverted_dies_away_and_does_not_jump() {
     let scene = scene(&model("tiny-corrected"), &stepping(0.01));
-    let nodes = scene.mesh().domain_nodes[..4].to_vec();
+    let nodes = scene.mesh().domain.nodes[..4].to_vec();
     let mut u = vec![0.0; 3 * scene.node_count()];
     let rest = u.clone();
     let mut fell_back = 0;

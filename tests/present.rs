@@ -21,12 +21,12 @@ fn corrected() -> SceneOptions {
 fn pressing(scene: &Scene, t: f64) -> Vec<Tool> {
     let mesh = scene.mesh();
     let place = |node: u32| [0, 1, 2].map(|axis| mesh.positions[3 * node as usize + axis]);
-    let count = mesh.domain_nodes.len() as f32;
+    let count = mesh.domain.nodes.len() as f32;
     let middle = [0, 1].map(|axis| {
-        let along = mesh.domain_nodes.iter().map(|&node| place(node)[axis]);
+        let along = mesh.domain.nodes.iter().map(|&node| place(node)[axis]);
         along.sum::<f32>() / count
     });
-    let nearest = mesh.domain_nodes.iter().min_by(|a, b| {
+    let nearest = mesh.domain.nodes.iter().min_by(|a, b| {
         let far = |node: u32| {
             (0..2)
                 .map(|k| (place(node)[k] - middle[k]).powi(2))
@@ -273,7 +273,8 @@ fn a_collision_field_is_presented_as_instruments_are() {
     let mesh = scene.mesh();
     let free = |node: &&u32| !mesh.held_nodes.contains(node);
     let nodes: Vec<u32> = mesh
-        .domain_nodes
+        .domain
+        .nodes
         .iter()
         .filter(free)
         .take(4)

@@ -36,8 +36,8 @@ struct Place {
 fn places(scene: &Scene, count: usize) -> Vec<Place> {
     let mesh = scene.mesh();
     let node = |n: u32| Vector::from_slice(&mesh.positions[3 * n as usize..][..3]);
-    let touchable = |n: &u32| mesh.domain_nodes.binary_search(n).is_ok();
-    let faces = mesh.domain_faces.as_chunks::<3>().0.iter();
+    let touchable = |n: &u32| mesh.domain.nodes.binary_search(n).is_ok();
+    let faces = mesh.domain.faces.as_chunks::<3>().0.iter();
     let all = faces.map(|face| face.map(node)).map(|[a, b, c]| Place {
         at: (a + b + c) / 3.0,
         outward: (b - a).cross(c - a).normalize(),
@@ -45,7 +45,7 @@ fn places(scene: &Scene, count: usize) -> Vec<Place> {
     let found: Vec<Place> = all
         .filter(|place| {
             let inside = place.at - place.outward * 12.0;
-            let mut nodes = mesh.surface_nodes.iter();
+            let mut nodes = mesh.surface.nodes.iter();
             nodes.all(|n| {
                 let far = |from: Vector, least: f32| node(*n).distance(from) > least;
                 far(inside, 9.0) && (touchable(n) || far(place.at, 16.0))
@@ -112,7 +112,7 @@ fn blade(scene: &Scene, node: u32, height: f32) -> Tool {
     let positions = mesh.positions.as_chunks::<3>().0;
     let at = |n: u32| Vector::from(positions[n as usize]);
     let is_near = |n: &u32| at(*n).distance(at(node)) < 8.0;
-    let faces = mesh.domain_faces.as_chunks::<3>().0.iter();
+    let faces = mesh.domain.faces.as_chunks::<3>().0.iter();
     let outward: Vector = faces
         .filter(|face| face.iter().any(is_near))
         .map(|face| face.map(at))

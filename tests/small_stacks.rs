@@ -92,7 +92,7 @@ fn steps_with_tools_stay_within_the_stated_stack() {
     });
     let mesh = scene.mesh();
     let place = |node: u32| Vector::from_slice(&mesh.positions[3 * node as usize..][..3]);
-    let corners = mesh.domain_faces.as_chunks::<3>().0[0].map(place);
+    let corners = mesh.domain.faces.as_chunks::<3>().0[0].map(place);
     let [a, b, c] = corners;
     let out = (b - a).cross(c - a).normalize();
     let mut flags = 0;

@@ -21,7 +21,7 @@ fn with(substeps: u32, target_mm: f32) -> SceneOptions {
 /// A ball of radius 3 mm over the domain's first node, `depth` mm inside of the rest surface and `aside` mm to its side.
 fn ball(scene: &Scene, depth: f32, aside: f32) -> Tool {
     let mesh = scene.mesh();
-    let node = mesh.domain_nodes[mesh.domain_nodes.len() / 2] as usize;
+    let node = mesh.domain.nodes[mesh.domain.nodes.len() / 2] as usize;
     let at = Vector::from_slice(&mesh.positions[3 * node..][..3]);
     let centre = at + Vector::new(aside, 0.0, 3.0 - depth);
     let shape = Shape::Sphere { radius: 3.0 };

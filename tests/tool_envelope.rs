@@ -40,8 +40,8 @@ fn balls(scene: &Scene, radius: f32, depth: f32, count: usize) -> Vec<Tool> {
     let mesh = scene.mesh();
     let place = |node: &u32| Vector::from_slice(&mesh.positions[3 * *node as usize..][..3]);
     let middle =
-        mesh.domain_nodes.iter().map(place).sum::<Vector>() / mesh.domain_nodes.len() as f32;
-    let face = mesh.domain_faces[..3].iter().map(place).collect::<Vec<_>>();
+        mesh.domain.nodes.iter().map(place).sum::<Vector>() / mesh.domain.nodes.len() as f32;
+    let face = mesh.domain.faces[..3].iter().map(place).collect::<Vec<_>>();
     let normal = (face[1] - face[0]).cross(face[2] - face[0]).normalize();
     let aside = normal.any_orthonormal_vector();
     (0..count)

@@ -55,7 +55,7 @@ struct Taken {
 /// A capsule that is pressed 6 mm into the middle of the domain in a second, slides 10 mm and is lifted.
 fn tools(model: &Model) -> upt::Result<Vec<Tool>> {
     let mesh = &model.mesh;
-    let domain = &mesh.domain_nodes;
+    let domain = &mesh.domain.nodes;
     let place = |node: u32| Vector::from(mesh.position(node));
     let mean = domain.iter().map(|&node| place(node)).sum::<Vector>() / domain.len() as f32;
     let centre = mesh

@@ -33,7 +33,7 @@ pub fn against_bundle_mesh(model: &Arc<Model>, name: &str) -> upt::Result<()> {
             ..options(1)
         },
     )?;
-    let count = own.mesh().surface_nodes.len();
+    let count = own.mesh().surface.nodes.len();
     let scenes = [&own, &fine];
     let patches = scenes.map(|scene| patch(scene.mesh(), 300));
     for scene in scenes {
@@ -83,6 +83,6 @@ pub fn against_bundle_mesh(model: &Arc<Model>, name: &str) -> upt::Result<()> {
 
 /// `count` surface nodes, evenly through the mesh's list.
 fn spread(mesh: &Mesh, count: usize) -> Vec<u32> {
-    let nodes = &mesh.surface_nodes;
+    let nodes = &mesh.surface.nodes;
     (0..count).map(|i| nodes[i * nodes.len() / count]).collect()
 }

@@ -5,7 +5,7 @@ use upt::{Contact, Scene, StepInput};
 
 /// Nodes of the domain within 8 mm of one of them.
 pub fn patch(mesh: &Mesh, around: usize) -> Vec<u32> {
-    let domain = &mesh.domain_nodes;
+    let domain = &mesh.domain.nodes;
     let centre = mesh.position(domain[around % domain.len()]);
     let near = |node: &u32| {
         let p = mesh.position(*node);

@@ -282,8 +282,8 @@ impl Model {
             kind,
             node_count: self.mesh.node_count() as u64,
             tet_count: (self.mesh.tets.len() / 4) as u64,
-            surface_face_count: (self.mesh.surface_faces.len() / 3) as u64,
-            domain_node_count: self.mesh.domain_nodes.len() as u64,
+            surface_face_count: (self.mesh.surface.faces.len() / 3) as u64,
+            domain_node_count: self.mesh.domain.nodes.len() as u64,
             held_node_count: self.mesh.held_nodes.len() as u64,
             supernode_count: supernodes as u64,
             dt: self.manifest.dt_s as f32,
@@ -387,11 +387,11 @@ impl Model {
     /// ```
     pub fn indices(&self, set: IndexSet) -> &[u32] {
         match set {
-            IndexSet::SurfaceNodes => &self.mesh.surface_nodes,
-            IndexSet::DomainNodes => &self.mesh.domain_nodes,
+            IndexSet::SurfaceNodes => &self.mesh.surface.nodes,
+            IndexSet::DomainNodes => &self.mesh.domain.nodes,
             IndexSet::HeldNodes => &self.mesh.held_nodes,
-            IndexSet::SurfaceFaces => &self.mesh.surface_faces,
-            IndexSet::DomainFaces => &self.mesh.domain_faces,
+            IndexSet::SurfaceFaces => &self.mesh.surface.faces,
+            IndexSet::DomainFaces => &self.mesh.domain.faces,
             IndexSet::Tets => &self.mesh.tets,
         }
     }

@@ -41,7 +41,7 @@ impl Scene {
         }
         let (rest, u) = (&self.mesh.positions, &shared.last.field);
         let position = |node| vector(rest, node) + vector(u, node);
-        let faces = self.mesh.domain_faces.as_chunks::<3>().0.iter().copied();
+        let faces = self.mesh.domain.faces.as_chunks::<3>().0.iter().copied();
         nearest(faces, position, place)
             .ok_or_else(|| Error::Argument("the bundle has no domain to tie".into()))
     }
@@ -70,7 +70,7 @@ impl Scene {
         let (rest, u) = (&mesh.positions, &shared.last.field);
         let position = |node| vector(rest, node) + vector(u, node);
         let mut area: Vec<f32> = memory::zeros(count, WHAT)?;
-        for face in mesh.domain_faces.as_chunks::<3>().0 {
+        for face in mesh.domain.faces.as_chunks::<3>().0 {
             let [a, b, c] = face.map(|node| vector(rest, node));
             let third = (b - a).cross(c - a).length() / 6.0;
             face.iter().for_each(|node| area[*node as usize] += third);

@@ -31,7 +31,7 @@ impl Haptics {
     pub(super) fn new(mesh: &Mesh, model: &Model) -> Result<Haptics> {
         let material = &model.manifest.material;
         Ok(Haptics {
-            forces: ReactionForces::new(mesh.tetrahedra(), &mesh.surface_nodes, material.moduli())?,
+            forces: ReactionForces::new(mesh.tetrahedra(), &mesh.surface.nodes, material.moduli())?,
             nodes: Vec::new(),
             around: Vec::new(),
             decoded: Vec::new(),

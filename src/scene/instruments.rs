@@ -62,7 +62,7 @@ impl Scene {
             none => none.insert(Asked {
                 contacts: InstrumentContacts::new(
                     &mesh.positions,
-                    &mesh.surface_faces,
+                    &mesh.surface.faces,
                     &mesh.held_nodes,
                 )?,
                 instruments: memory::room(MAX_TOOLS, "the instruments' contacts")?,

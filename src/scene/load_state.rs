@@ -55,11 +55,11 @@ struct Pressure {
 impl LoadState {
     /// For a mesh as a body that was made of it is now; `domain_faces` are those of the intact mesh.
     pub(super) fn new(mesh: &Mesh, body: Option<&Body>, domain_faces: &[u32]) -> Result<LoadState> {
-        let faces = mesh.surface_faces.len() / 3;
+        let faces = mesh.surface.faces.len() / 3;
         let mut domain = memory::copied(domain_faces, WHAT)?;
         let domain = domain.as_chunks_mut::<3>().0;
         domain.sort_unstable();
-        let rows = mesh.surface_faces.as_chunks::<3>().0.iter();
+        let rows = mesh.surface.faces.as_chunks::<3>().0.iter();
         let is_domain = rows.map(|face| domain.binary_search(face).is_ok());
         let pressed = Pressed::new(mesh, body)?;
         let most = pressed.triangles.len();
@@ -191,7 +191,7 @@ impl LoadState {
         }
         // Pressures add up where regions overlap; the last entry is that of the whole domain, for faces that cuts lay open.
         next.pascal.fill(0.0);
-        let faces = mesh.surface_faces.as_chunks::<3>().0;
+        let faces = mesh.surface.faces.as_chunks::<3>().0;
         for (index, pressure) in loads.pressures.iter().enumerate() {
             self.pressure.marked.fill(false);
             let (nodes, marked) = (pressure.nodes, &mut self.pressure.marked);

@@ -220,13 +220,13 @@ impl SceneLoads {
 
 /// Bytes of saved loads at most.
 pub(super) fn saved_bytes(body: &SceneBody) -> usize {
-    4 * (2 * body.mesh.positions.len() + body.mesh.surface_faces.len()) + 128
+    4 * (2 * body.mesh.positions.len() + body.mesh.surface.faces.len()) + 128
 }
 
 /// No loads, of the body as it is.
 fn blank(body: &SceneBody) -> Result<Box<LoadState>> {
     let cut = body.cut.as_ref().map(|cut| &cut.body);
-    let domain = &body.intact_mesh().domain_faces;
+    let domain = &body.intact_mesh().domain.faces;
     memory::boxed(LoadState::new(&body.mesh, cut, domain)?, WHAT)
 }
 

@@ -179,7 +179,7 @@ impl Acting {
         Ok(Acting {
             dead: memory::zeros(mesh.positions.len(), WHAT)?,
             gravity: [0.0; 3],
-            pascal: memory::zeros(mesh.surface_faces.len() / 3 + 1, WHAT)?,
+            pascal: memory::zeros(mesh.surface.faces.len() / 3 + 1, WHAT)?,
             pushed: Vec::new(),
             acts: false,
             carried: None,
@@ -228,6 +228,6 @@ impl Acting {
             return Err(Error::Snapshot("the support's motion is damaged".into()));
         }
         supports::admit(&self.supports, &mesh.supports)?;
-        stored::check(&self.pascal, mesh.surface_faces.len() / 3 + 1)
+        stored::check(&self.pascal, mesh.surface.faces.len() / 3 + 1)
     }
 }

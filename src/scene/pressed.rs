@@ -29,7 +29,7 @@ impl Pressed {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn new(mesh: &Mesh, body: Option<&Body>) -> Result<Pressed> {
-        let faces = mesh.surface_faces.as_chunks::<3>().0;
+        let faces = mesh.surface.faces.as_chunks::<3>().0;
         let numbered = || faces.iter().copied().enumerate();
         let Some(body) = body else {
             let all = numbered().map(|(row, face)| (row as u32, face));

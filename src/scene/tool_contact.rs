@@ -256,7 +256,7 @@ impl ToolContact {
     /// Bytes of what is saved of it, at most.
     pub fn saved_bytes(&self, body: &SceneBody) -> usize {
         // A sample may be pushed and held by each of the tools; more than all samples once is never seen.
-        let faces = body.mesh.domain_faces.len() / 3 + body.mesh.opened.pieces.len();
+        let faces = body.mesh.domain.faces.len() / 3 + body.mesh.domain.opened.pieces.len();
         let ties = self.past(false).map_or(0, |past| past.ties.len());
         64 * MAX_TOOLS + 4096 + 16 * 64 * faces + 160 * ties
     }

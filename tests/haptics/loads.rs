@@ -78,7 +78,8 @@ fn a_hand_feels_the_ties_of_its_tool() {
     let place = top(&scene);
     let node = scene
         .mesh()
-        .domain_nodes
+        .domain
+        .nodes
         .iter()
         .copied()
         .find(|node| scene.mesh().positions[3 * *node as usize..][..3] == place)

@@ -138,7 +138,7 @@ fn a_cut_body_sags_as_the_truth_does() {
 fn loads_go_on_across_cuts_and_undo() {
     let model = liver();
     let scene = Scene::new(std::sync::Arc::clone(&model), &options()).unwrap();
-    let nodes = scene.mesh().domain_nodes.clone();
+    let nodes = scene.mesh().domain.nodes.clone();
     let pressures = [Pressure {
         nodes: &nodes,
         pascal: 80.0,

@@ -80,7 +80,7 @@ fn random_operations_leave_every_state_finite_and_none_is_lost() {
     };
     let scene = Scene::new(model, &options).unwrap();
     let mesh = std::sync::Arc::clone(scene.mesh());
-    let faces = mesh.domain_faces.as_chunks::<3>().0;
+    let faces = mesh.domain.faces.as_chunks::<3>().0;
     let place = |node: u32| Vector::from_slice(&mesh.positions[3 * node as usize..][..3]);
     let mut draw = Draw(number("UPT_FUZZ_SEED", 0) as u64 + 46);
     let mut counts = Counts::default();

@@ -83,7 +83,8 @@ fn a_region_goes_on_across_cuts() {
     let edge = slit(&scene, 6.0, 15.0);
     let nodes: Vec<u32> = scene
         .mesh()
-        .domain_nodes
+        .domain
+        .nodes
         .iter()
         .copied()
         .step_by(7)

@@ -50,9 +50,9 @@ fn with(corrections: u32) -> SceneOptions {
 fn site(scene: &Scene) -> ([f32; 3], Vector) {
     let mesh = scene.mesh();
     let place = |node: u32| Vector::from_slice(&mesh.positions[3 * node as usize..][..3]);
-    let nodes = mesh.domain_nodes.iter().map(|&node| place(node));
-    let middle = nodes.clone().sum::<Vector>() / mesh.domain_nodes.len() as f32;
-    let normal = mesh.domain_faces.as_chunks::<3>().0.iter();
+    let nodes = mesh.domain.nodes.iter().map(|&node| place(node));
+    let middle = nodes.clone().sum::<Vector>() / mesh.domain.nodes.len() as f32;
+    let normal = mesh.domain.faces.as_chunks::<3>().0.iter();
     let normal: Vector = normal
         .map(|face| face.map(place))
         .map(|[a, b, c]| (b - a).cross(c - a))

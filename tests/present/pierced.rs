@@ -51,7 +51,7 @@ fn depth(scene: &Scene, u: &[f32], body: &Body, pose: &Pose) -> f32 {
         )
     };
     let mut deepest = 0.0f32;
-    for face in mesh.surface_faces.as_chunks::<3>().0 {
+    for face in mesh.surface.faces.as_chunks::<3>().0 {
         let [a, b, c] = face.map(place);
         if body.nearest_at(pose, a).distance > 15.0 {
             continue;

@@ -2,7 +2,8 @@
 
 use topology::{Body, Changes, Skin};
 
-use super::mesh::{Bounds, Mesh, Opened, unique, unique_below};
+use super::domain::{Bounds, Domain, Opened};
+use super::mesh::{Mesh, unique, unique_below};
 use super::node_set::NodeSet;
 use field::error::Result;
 use field::memory;
@@ -41,28 +42,15 @@ impl Mesh {
         for &parent in body.parents() {
             positions.extend(self.position(parent));
         }
-        let most = self.tets.len() / 4 + new.len();
-        let mut tets = memory::room(4 * most, WHAT)?;
-        let mut stiffness = memory::room(most, WHAT)?;
+        let whole = self.tets.len() / 4;
+        let mut tets = memory::room(4 * (whole + new.len()), WHAT)?;
         let ends = gone.iter().map(|element| *element as usize);
-        let ends = ends.chain([self.tets.len() / 4]);
         let mut start = 0;
-        for end in ends.clone() {
+        for end in ends.chain([whole]) {
             tets.extend_from_slice(&self.tets[4 * start..4 * end]);
-            match self.stiffness.is_empty() {
-                true => stiffness.resize(stiffness.len() + end - start, 1.0),
-                false => stiffness.extend_from_slice(&self.stiffness[start..end]),
-            }
             start = end + 1;
         }
-        for element in new {
-            tets.extend(element.nodes);
-            stiffness.push(self.stiffness_of(element));
-        }
-        let starts = std::iter::once(0).chain(gone.iter().map(|element| *element as usize + 1));
-        let kept = starts.zip(ends).map(|(start, end)| start..end);
-        let parents = new.iter().map(|element| element.parent as usize);
-        let runs = kept.chain(parents.map(|parent| parent..parent + 1));
+        tets.extend(new.iter().flat_map(|element| element.nodes));
         let skin = body.skin()?;
         let touchable = body.touchable_of(self.domain_sides(body)?, &skin)?;
         let domain_faces = memory::copied(touchable.faces.as_flattened(), WHAT)?;
@@ -91,45 +79,35 @@ impl Mesh {
         for set in &self.supports {
             supports.push(cut_set(set, body, &is_left)?);
         }
-        let mut node_area = memory::room(count, WHAT)?;
-        node_area.extend_from_slice(&self.node_area);
-        node_area.resize(count, 0.0);
         Ok(Mesh {
             positions,
             tets,
-            stiffness,
-            laws: self.laws.gathered(most, runs)?,
-            surface_faces: memory::copied(&self.surface_faces, WHAT)?,
-            domain_nodes,
-            domain_faces,
-            surface_nodes: memory::copied(&self.surface_nodes, WHAT)?,
+            laws: self.laws.cut(whole, changes)?,
+            surface: self.surface.with_nodes(count)?,
+            domain: Domain {
+                faces: domain_faces,
+                nodes: domain_nodes,
+                opened: Opened {
+                    corners: touchable.corners,
+                    pieces: touchable.pieces,
+                    first_wall: touchable.first_wall,
+                    bounds: self.bounds(body, &skin)?,
+                    ..Opened::default()
+                },
+            },
             held_nodes: unique(held_nodes),
             supports,
             regions: Vec::new(),
-            node_area,
             sha256: self.sha256.clone(),
-            opened: Opened {
-                corners: touchable.corners,
-                pieces: touchable.pieces,
-                first_wall: touchable.first_wall,
-                bounds: self.bounds(body, &skin)?,
-                ..Opened::default()
-            },
         })
     }
 
-    /// Stiffness over the material's of an element that one of this mesh's has become, its share with it.
-    pub fn stiffness_of(&self, element: &topology::Element) -> f32 {
-        let own = self.stiffness.get(element.parent as usize).copied();
-        own.unwrap_or(1.0) * element.stiffness * element.share as f32
-    }
-
     fn bounds(&self, body: &Body, skin: &Skin) -> Result<Bounds> {
-        let border = match self.opened.border.get() {
+        let border = match self.domain.opened.border.get() {
             Some(border) => border,
             None => {
                 let border = body.mesh().border(|_| true)?;
-                self.opened.border.get_or_init(|| border)
+                self.domain.opened.border.get_or_init(|| border)
             }
         };
         let topology::Bounds {
@@ -146,17 +124,17 @@ impl Mesh {
     }
 
     fn domain_sides(&self, body: &Body) -> Result<&[(u32, u8)]> {
-        if let Some(sides) = self.opened.domain_sides.get() {
+        if let Some(sides) = self.domain.opened.domain_sides.get() {
             return Ok(sides);
         }
-        let mut domain = memory::room(self.domain_faces.len() / 3, WHAT)?;
-        for face in self.domain_faces.as_chunks::<3>().0 {
+        let mut domain = memory::room(self.domain.faces.len() / 3, WHAT)?;
+        for face in self.domain.faces.as_chunks::<3>().0 {
             let mut corners = *face;
             corners.sort_unstable();
             domain.push(corners);
         }
         domain.sort_unstable();
         let sides = (body.mesh()).border(|corners| domain.binary_search(&corners).is_ok())?;
-        Ok(self.opened.domain_sides.get_or_init(|| sides))
+        Ok(self.domain.opened.domain_sides.get_or_init(|| sides))
     }
 }

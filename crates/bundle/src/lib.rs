@@ -4,6 +4,7 @@
 
 mod checks;
 mod cut_mesh;
+mod domain;
 mod faults;
 mod files;
 mod known;
@@ -17,12 +18,15 @@ mod node_set;
 mod parse;
 mod place;
 mod seal;
+mod surface;
 mod tensors;
 
 // `derive(HeldBytes)` looks for it here.
+pub use domain::{Bounds, Domain, Opened};
 use field::memory;
 pub use files::BundleFiles;
 pub use files::hex;
+pub use laws::ElementLaws;
 pub use manifest::{
     Base, Bound, Boundary, Coordinates, CorrectionsEntry, Dims, Envelope, Fade, Feature, FileEntry,
     Graph, Manifest, ManifestKind, MeshEntry, Normalisation, PriorEntry, ReducedEntry,
@@ -33,4 +37,5 @@ pub use mesh::volume;
 pub use node_set::NodeSet;
 pub use place::read_regular;
 pub use place::{Place, file_of};
+pub use surface::Surface;
 pub use tensors::TensorFile;

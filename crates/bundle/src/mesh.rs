@@ -1,13 +1,13 @@
 //! `mesh.safetensors`: the tetrahedral mesh of a bundle, checked, and the node sets that follow from it.
 
-use std::sync::OnceLock;
-
 use sha2::{Digest, Sha256};
 
+use super::domain::Domain;
 use super::files::hex;
-use super::laws::LawTable;
+use super::laws::ElementLaws;
 use super::manifest::Boundary;
 use super::node_set::NodeSet;
+use super::surface::Surface;
 use super::tensors::TensorFile;
 use field::error::{Error, Result};
 use field::memory::{self, HeldBytes};
@@ -24,60 +24,20 @@ pub struct Mesh {
     pub positions: Vec<f32>,
     /// Tetrahedra `[T,4]`.
     pub tets: Vec<u32>,
-    /// Young's modulus of each tetrahedron over the material's `[T]`; empty where the body is uniform.
-    pub stiffness: Vec<f32>,
-    /// Laws of its regions, and directions of fibres.
-    pub laws: LawTable,
-    /// Boundary triangles `[F,3]`, outward.
-    pub surface_faces: Vec<u32>,
-    /// Triangles of the domain `[D,3]`; of a cut body those that are whole.
-    pub domain_faces: Vec<u32>,
-    /// Nodes of the boundary triangles, ascending.
-    pub surface_nodes: Vec<u32>,
-    /// Nodes of the domain's triangles, and of what has been laid open, ascending.
-    pub domain_nodes: Vec<u32>,
+    /// What each tetrahedron is made of.
+    pub laws: ElementLaws,
+    /// The boundary of the intact body.
+    pub surface: Surface,
+    /// What tools may touch.
+    pub domain: Domain,
     /// Nodes held at zero, ascending.
     pub held_nodes: Vec<u32>,
     /// Parts of them that move apart from the others.
     pub supports: Vec<NodeSet>,
     /// Named parts of the surface.
     pub regions: Vec<NodeSet>,
-    /// A third of the area of each node's boundary triangles `[K]`, mm^2.
-    pub node_area: Vec<f32>,
     /// The mesh hash of `docs/reference/formats.md`.
     pub sha256: String,
-    /// What a blade has laid open.
-    pub opened: Opened,
-}
-
-/// What of a cut body's domain is not whole faces ([`topology::Touchable`]), and what a cut looks at.
-#[derive(Debug, Default, HeldBytes)]
-pub struct Opened {
-    /// The domain's triangles as faces of elements, from the first cut on.
-    #[held(skip)]
-    pub(super) domain_sides: OnceLock<Vec<(u32, u8)>>,
-    /// Corners of the pieces: nodes and weights.
-    pub corners: Vec<([u32; 4], [f32; 4])>,
-    /// Triangles, outward.
-    pub pieces: Vec<[u32; 3]>,
-    /// Those from here on are walls: a blade has gone through elements there.
-    pub first_wall: usize,
-    /// The mesh's border as faces of elements, likewise.
-    #[held(skip)]
-    pub(super) border: OnceLock<Vec<(u32, u8)>>,
-    pub bounds: Bounds,
-}
-
-/// All that bounds the tissue of a cut body ([`topology::Bounds`]); none where nothing has been cut: the boundary triangles do.
-#[derive(Debug, Default, HeldBytes)]
-pub struct Bounds {
-    /// Nodes of the faces, ascending.
-    pub nodes: Vec<u32>,
-    pub faces: Vec<[u32; 3]>,
-    /// Nodes and weights.
-    pub corners: Vec<([u32; 4], [f32; 4])>,
-    /// Triangles of corners.
-    pub pieces: Vec<[u32; 3]>,
 }
 
 impl Mesh {
@@ -109,16 +69,7 @@ impl Mesh {
         {
             return Err(file.bad("tets", format!("element {at} has no positive volume")));
         }
-        let stiffness = if file.has("stiffness") {
-            file.f32("stiffness", &[Some(tets.len() / 4)])?
-        } else {
-            Vec::new()
-        };
-        if let Some(tet) = stiffness.iter().position(|&factor| factor <= 0.0) {
-            let problem = format!("element {tet} is {}, must be positive", stiffness[tet]);
-            return Err(file.bad("stiffness", problem));
-        }
-        let laws = super::laws::read(file, tets.len() / 4)?;
+        let laws = ElementLaws::read(file, tets.len() / 4)?;
         let surface_faces = file.indices("surface", &[None, Some(3)], count)?;
         let domain = if file.has("domain") {
             file.indices("domain", &[None], surface_faces.len() / 3)?
@@ -164,18 +115,13 @@ impl Mesh {
             held_nodes.extend(supported);
         }
         Ok(Mesh {
-            node_area: node_area(&positions, &surface_faces)?,
-            surface_nodes: unique(memory::copied(&surface_faces, WHAT)?),
-            domain_nodes: unique(memory::copied(&domain_faces, WHAT)?),
+            surface: Surface::of(&positions, surface_faces)?,
+            domain: Domain::of(domain_faces)?,
             held_nodes: unique(held_nodes),
             positions,
             tets,
-            stiffness,
             laws,
-            surface_faces,
-            domain_faces,
             sha256: hex(&hash.finalize()),
-            opened: Opened::default(),
             supports: Vec::new(),
             regions: Vec::new(),
         })
@@ -186,7 +132,7 @@ impl Mesh {
         elements::Tetrahedra {
             positions: self.positions.as_chunks().0,
             tets: self.tets.as_chunks().0,
-            stiffness: &self.stiffness,
+            stiffness: &self.laws.stiffness,
             laws: self.laws.view(),
         }
     }
@@ -264,7 +210,7 @@ impl Mesh {
                 );
             }
             let is_in = |node: &u32| region.nodes.binary_search(node).is_ok();
-            let faces = self.surface_faces.as_chunks::<3>().0;
+            let faces = self.surface.faces.as_chunks::<3>().0;
             if !region.nodes.is_sorted_by(|a, b| a < b)
                 || !faces.iter().any(|face| face.iter().all(is_in))
             {
@@ -320,7 +266,7 @@ pub(super) fn unique_below(count: usize, nodes: &[u32]) -> Result<Vec<u32>> {
     Ok(found)
 }
 
-fn at(positions: &[f32], node: u32) -> [f64; 3] {
+pub(super) fn at(positions: &[f32], node: u32) -> [f64; 3] {
     let i = 3 * node as usize;
     [
         positions[i] as f64,
@@ -329,11 +275,11 @@ fn at(positions: &[f32], node: u32) -> [f64; 3] {
     ]
 }
 
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(super) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -347,21 +293,4 @@ pub fn volume(positions: &[f32], tet: &[u32]) -> f64 {
     let [a, b, c] = [1, 2, 3].map(|k| minus(at(positions, tet[k]), origin));
     let n = cross(a, b);
     n[0] * c[0] + n[1] * c[1] + n[2] * c[2]
-}
-
-fn node_area(positions: &[f32], faces: &[u32]) -> Result<Vec<f32>> {
-    let count = positions.len() / 3;
-    let mut area = memory::filled(count, 0.0f64, WHAT)?;
-    for face in faces.chunks_exact(3) {
-        let origin = at(positions, face[0]);
-        let n = cross(
-            minus(at(positions, face[1]), origin),
-            minus(at(positions, face[2]), origin),
-        );
-        let third = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt() / 6.0;
-        for &node in face {
-            area[node as usize] += third;
-        }
-    }
-    memory::collected(count, area.into_iter().map(|a| a as f32), WHAT)
 }

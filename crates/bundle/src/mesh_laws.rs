@@ -16,7 +16,7 @@ impl Mesh {
     /// [`Error::Bundle`] with the region.
     pub fn check_laws(&self, file: &str, material: &Material) -> Result<()> {
         let body = self.tetrahedra();
-        let checked = (body.laws).check_with(body.tets.len(), &self.stiffness, material);
+        let checked = (body.laws).check_with(body.tets.len(), body.stiffness, material);
         checked.map_err(|error| fault(file, &error))
     }
 

@@ -157,7 +157,7 @@ impl Bench {
 
     /// Area around the nodes of a patch, mm², as the envelope has it.
     fn area_of(&self, patch: &Patch) -> f64 {
-        let areas = &self.model.mesh.node_area;
+        let areas = &self.model.mesh.surface.node_area;
         let nodes = patch.nodes.iter();
         nodes.map(|node| f64::from(areas[*node as usize])).sum()
     }

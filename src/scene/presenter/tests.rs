@@ -40,7 +40,7 @@ impl Host {
     fn tool(&self, t: f64) -> [Tool; 1] {
         let mesh = self.scene.mesh();
         let place = |node: u32| [0, 1, 2].map(|k| mesh.positions[3 * node as usize + k]);
-        let nodes = mesh.domain_nodes.iter().map(|&node| place(node));
+        let nodes = mesh.domain.nodes.iter().map(|&node| place(node));
         let [x, y, z] = nodes.max_by(|a, b| a[2].total_cmp(&b[2])).unwrap();
         let shape = Shape::Sphere { radius: 3.0 };
         let centre = [x, y, z + 3.0 - 0.4 * t as f32];
@@ -137,7 +137,7 @@ fn points_of_a_frame_take_the_collision_field_of_its_region() {
     let model = model();
     let [mut both, mut points] = [(); 2].map(|()| Host::new(&model));
     let mesh = both.scene.mesh();
-    let free = mesh.domain_nodes.iter();
+    let free = mesh.domain.nodes.iter();
     let free = free.filter(|node| !mesh.held_nodes.contains(node));
     let nodes: Vec<u32> = free.take(4).copied().collect();
     let at = |t: f32| [0.0, 0.0, -0.3 * t].repeat(4);

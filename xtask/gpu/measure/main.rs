@@ -136,7 +136,7 @@ impl Way {
     /// Nodes in the middle of the domain.
     fn patch(&self) -> Vec<u32> {
         let mesh = &self.model.mesh;
-        pushes::patch(mesh, mesh.domain_nodes.len() / 2)
+        pushes::patch(mesh, mesh.domain.nodes.len() / 2)
     }
 
     fn rollout(&self) -> Result<Vec<f32>> {

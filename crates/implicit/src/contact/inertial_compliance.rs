@@ -174,7 +174,7 @@ mod tests {
             held[node as usize] = true;
         }
         let places = mesh.positions.as_chunks().0;
-        let faces = mesh.domain_faces.as_chunks().0;
+        let faces = mesh.domain.faces.as_chunks().0;
         let samples =
             ::contact::Samples::try_new(places, faces, &mesh.held_nodes, ::contact::SPACING_MM);
         let samples = samples.unwrap();

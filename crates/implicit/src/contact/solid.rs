@@ -28,7 +28,7 @@ impl Sides {
     /// # Errors
     /// [`crate::Error::OutOfMemory`].
     pub fn of(mesh: &Mesh) -> Result<Sides> {
-        Self::new(mesh.node_count() + mesh.opened.bounds.corners.len())
+        Self::new(mesh.node_count() + mesh.domain.opened.bounds.corners.len())
     }
 
     fn new(count: usize) -> Result<Sides> {
@@ -71,9 +71,9 @@ pub(super) struct Crossing {
 
 impl<'a> Solid<'a> {
     pub fn of(mesh: &'a Mesh, state: State<'a>, sides: &'a mut Sides) -> Solid<'a> {
-        let bounds = &mesh.opened.bounds;
+        let bounds = &mesh.domain.opened.bounds;
         let (nodes, faces) = match bounds.faces.is_empty() {
-            true => (&mesh.surface_nodes, mesh.surface_faces.as_chunks().0),
+            true => (&mesh.surface.nodes, mesh.surface.faces.as_chunks().0),
             false => (&bounds.nodes, bounds.faces.as_slice()),
         };
         Solid {

@@ -104,10 +104,10 @@ impl Corrections {
         }
         let corners = body.mesh().tet(element);
         let rest = corners.map(|node| mesh.position(node).map(f64::from));
-        let own = mesh.stiffness.get(element as usize).copied().unwrap_or(1.0);
+        let own = mesh.laws.stiffness_at(element);
         let whole = Tetrahedron::new(corners, rest, 1.0);
         let mut lost = Tetrahedron::new(corners, rest, f64::from(own));
-        let laws = mesh.tetrahedra().laws;
+        let laws = mesh.laws.view();
         // kg/m³ in g/mm³.
         let density = 1e-6 * laws.density_of(element as usize, material.density_kg_m3);
         let moduli = material.moduli();
@@ -173,7 +173,7 @@ impl Corrections {
         around.sort_unstable();
         around.dedup();
         let moduli = material.moduli();
-        let laws = intact.tetrahedra().laws;
+        let laws = intact.laws.view();
         let mut add = |corners: [u32; 4], parent: u32, (stiffness, share): (f32, f64)| {
             let rest = (body.mesh().tet(parent)).map(|node| intact.position(node).map(f64::from));
             let tet = Tetrahedron::new(corners, rest, f64::from(stiffness));
@@ -193,13 +193,12 @@ impl Corrections {
         };
         for element in around {
             if changes.gone.binary_search(&element).is_err() {
-                let stiffness = intact.stiffness.get(element as usize).copied();
-                let corners = body.mesh().tet(element);
-                add(corners, element, (stiffness.unwrap_or(1.0), 1.0));
+                let stiffness = intact.laws.stiffness_at(element);
+                add(body.mesh().tet(element), element, (stiffness, 1.0));
             }
         }
         for element in &changes.new {
-            let stiffness = intact.stiffness_of(element);
+            let stiffness = intact.laws.stiffness_of(element);
             add(element.nodes, element.parent, (stiffness, element.share));
         }
         Ok(own)
@@ -216,12 +215,16 @@ impl Corrections {
         let mut cells = memory::room(changes.new.len(), WHAT)?;
         for element in &changes.new {
             let place = changes.gone.partition_point(|gone| *gone < element.parent);
-            cells.push((place as u32, element.nodes, intact.stiffness_of(element)));
+            cells.push((
+                place as u32,
+                element.nodes,
+                intact.laws.stiffness_of(element),
+            ));
         }
         let elements = CutTetrahedra {
             positions: cut.positions.as_chunks().0,
             tets: intact.tets.as_chunks().0,
-            stiffness: &intact.stiffness,
+            stiffness: &intact.laws.stiffness,
             fibre: &intact.laws.fibre,
             changed: &changes.gone,
             cells: &cells,

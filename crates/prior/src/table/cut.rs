@@ -82,7 +82,7 @@ impl PriorTable {
         );
         let mut sources = Vec::new();
         let mut in_domain = memory::filled(count, false, WHAT)?;
-        for &node in &mesh.domain_nodes {
+        for &node in &mesh.domain.nodes {
             in_domain[node as usize] = true;
             // A copy, or a node inside the body that a cut has laid bare: the nearest column of its
             // parent is the nearest of its own, as both rest at one place.

@@ -134,7 +134,7 @@ impl PriorTable {
             .map_or((0, 0), |reduced| (reduced.modes, reduced.response_modes));
         // A contact outside of the domain is answered by the nearest column, and told of by a flag.
         let mut in_domain = memory::filled(count, false, WHAT)?;
-        for &node in &mesh.domain_nodes {
+        for &node in &mesh.domain.nodes {
             in_domain[node as usize] = true;
         }
         let response = if stepped::is_stepped(file, "response") {
@@ -238,7 +238,7 @@ fn nearest_columns(mesh: &Mesh, contact_nodes: &[u32]) -> Result<Vec<u32>> {
     let grid = PointGrid::try_new(points)?;
     let area: f64 = contact_nodes
         .iter()
-        .map(|&node| mesh.node_area[node as usize] as f64)
+        .map(|&node| mesh.surface.node_area[node as usize] as f64)
         .sum();
     // The side of a square of a contact node's mean area.
     let edge = (area / contact_nodes.len() as f64).sqrt();

@@ -20,13 +20,13 @@ impl Site {
     pub fn of(scene: &Scene, seed: u64) -> Option<Site> {
         let mesh = scene.mesh();
         let at = |node: u32| Vector::from_slice(&mesh.positions[3 * node as usize..][..3]);
-        let faces: Vec<(Vector, Vector)> = (mesh.domain_faces.chunks_exact(3))
+        let faces: Vec<(Vector, Vector)> = (mesh.domain.faces.chunks_exact(3))
             .map(|face| {
                 let [a, b, c] = [0, 1, 2].map(|k| at(face[k]));
                 ((a + b + c) / 3.0, (b - a).cross(c - a))
             })
             .collect();
-        let mut rated: Vec<(f32, u32, Vector)> = (mesh.domain_nodes.iter())
+        let mut rated: Vec<(f32, u32, Vector)> = (mesh.domain.nodes.iter())
             .map(|&node| {
                 let near = faces
                     .iter()

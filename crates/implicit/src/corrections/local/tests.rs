@@ -142,7 +142,7 @@ fn errors(bench: &Bench, base_mm: f32, step_mm: f32) -> [f64; 2] {
     let mut random = Random::new(11);
     let mut solver = ImplicitSolver::new(context).unwrap();
     let (_, u) = bench.smooth(&mut random, base_mm);
-    let middle = bench.mesh.domain_nodes[bench.mesh.domain_nodes.len() / 2];
+    let middle = bench.mesh.domain.nodes[bench.mesh.domain.nodes.len() / 2];
     let (local, mut step) = bench.begun(&input, &mut solver, &u, middle);
     assert!(
         local.set.near.places.inside > 20
@@ -319,7 +319,7 @@ fn the_next_set_comes_over_steps() {
         residual: &bench.zero,
     };
     let rest = &bench.mesh.positions;
-    let domain = &bench.mesh.domain_nodes;
+    let domain = &bench.mesh.domain.nodes;
     let first = domain[domain.len() / 2];
     let at = |node: u32, from: f32, to: f32| {
         !is_by(rest, &[first], node, from) && is_by(rest, &[first], node, to)

@@ -1,0 +1,64 @@
+//! What tools may touch of a body: whole faces, and on a cut body what a blade has laid open.
+
+use std::sync::OnceLock;
+
+use super::mesh::unique;
+use field::error::Result;
+use field::memory::{self, HeldBytes};
+
+const WHAT: &str = "a mesh";
+
+/// The part of the surface that tools may touch.
+#[derive(Debug, HeldBytes)]
+pub struct Domain {
+    /// Triangles `[D,3]`, outward; of a cut body those that are whole.
+    pub faces: Vec<u32>,
+    /// Nodes of these triangles, and of what has been laid open, ascending.
+    pub nodes: Vec<u32>,
+    /// What a blade has laid open.
+    pub opened: Opened,
+}
+
+impl Domain {
+    /// That of an intact body.
+    ///
+    /// # Errors
+    /// [`field::Error::OutOfMemory`].
+    pub(super) fn of(faces: Vec<u32>) -> Result<Domain> {
+        Ok(Domain {
+            nodes: unique(memory::copied(&faces, WHAT)?),
+            faces,
+            opened: Opened::default(),
+        })
+    }
+}
+
+/// What of a cut body's domain is not whole faces ([`topology::Touchable`]), and what a cut looks at.
+#[derive(Debug, Default, HeldBytes)]
+pub struct Opened {
+    /// The domain's triangles as faces of elements, from the first cut on.
+    #[held(skip)]
+    pub(super) domain_sides: OnceLock<Vec<(u32, u8)>>,
+    /// Corners of the pieces: nodes and weights.
+    pub corners: Vec<([u32; 4], [f32; 4])>,
+    /// Triangles, outward.
+    pub pieces: Vec<[u32; 3]>,
+    /// Those from here on are walls: a blade has gone through elements there.
+    pub first_wall: usize,
+    /// The mesh's border as faces of elements, likewise.
+    #[held(skip)]
+    pub(super) border: OnceLock<Vec<(u32, u8)>>,
+    pub bounds: Bounds,
+}
+
+/// All that bounds the tissue of a cut body ([`topology::Bounds`]); none where nothing has been cut: the boundary triangles do.
+#[derive(Debug, Default, HeldBytes)]
+pub struct Bounds {
+    /// Nodes of the faces, ascending.
+    pub nodes: Vec<u32>,
+    pub faces: Vec<[u32; 3]>,
+    /// Nodes and weights.
+    pub corners: Vec<([u32; 4], [f32; 4])>,
+    /// Triangles of corners.
+    pub pieces: Vec<[u32; 3]>,
+}
