@@ -3,8 +3,8 @@
 use topology::{Body, Changes, Skin};
 
 use super::domain::{Bounds, Domain, Opened};
-use super::mesh::{Mesh, unique, unique_below};
-use super::node_set::NodeSet;
+use super::mesh::Mesh;
+use super::node_set::{NodeSet, unique, unique_below};
 use field::error::Result;
 use field::memory;
 

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use super::mesh::unique;
+use super::node_set::unique;
 use field::error::Result;
 use field::memory::{self, HeldBytes};
 

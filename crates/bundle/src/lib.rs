@@ -7,6 +7,7 @@ mod cut_mesh;
 mod domain;
 mod faults;
 mod files;
+mod geometry;
 mod known;
 mod laws;
 pub mod limits;
@@ -26,6 +27,7 @@ pub use domain::{Bounds, Domain, Opened};
 use field::memory;
 pub use files::BundleFiles;
 pub use files::hex;
+pub use geometry::volume;
 pub use laws::ElementLaws;
 pub use manifest::{
     Base, Bound, Boundary, Coordinates, CorrectionsEntry, Dims, Envelope, Fade, Feature, FileEntry,
@@ -33,7 +35,6 @@ pub use manifest::{
     ReducedInput, ToolEnvelope, UptEntry,
 };
 pub use mesh::Mesh;
-pub use mesh::volume;
 pub use node_set::NodeSet;
 pub use place::read_regular;
 pub use place::{Place, file_of};

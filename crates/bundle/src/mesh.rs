@@ -4,9 +4,10 @@ use sha2::{Digest, Sha256};
 
 use super::domain::Domain;
 use super::files::hex;
+use super::geometry::volume;
 use super::laws::ElementLaws;
 use super::manifest::Boundary;
-use super::node_set::NodeSet;
+use super::node_set::{NodeSet, unique};
 use super::surface::Surface;
 use super::tensors::TensorFile;
 use field::error::{Error, Result};
@@ -243,54 +244,4 @@ impl Mesh {
             self.positions[i + 2],
         ]
     }
-}
-
-pub(super) fn unique(mut nodes: Vec<u32>) -> Vec<u32> {
-    nodes.sort_unstable();
-    nodes.dedup();
-    nodes
-}
-
-/// Ascending and each once, of nodes below `count`: without sorting them, where they are many.
-pub(super) fn unique_below(count: usize, nodes: &[u32]) -> Result<Vec<u32>> {
-    let mut is_there = memory::filled(count, false, WHAT)?;
-    for &node in nodes {
-        is_there[node as usize] = true;
-    }
-    let mut found = memory::room(nodes.len().min(count), WHAT)?;
-    found.extend(
-        (0u32..)
-            .zip(&is_there)
-            .filter_map(|(node, is)| is.then_some(node)),
-    );
-    Ok(found)
-}
-
-pub(super) fn at(positions: &[f32], node: u32) -> [f64; 3] {
-    let i = 3 * node as usize;
-    [
-        positions[i] as f64,
-        positions[i + 1] as f64,
-        positions[i + 2] as f64,
-    ]
-}
-
-pub(super) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-/// Six times the signed volume of a tetrahedron.
-pub fn volume(positions: &[f32], tet: &[u32]) -> f64 {
-    let origin = at(positions, tet[0]);
-    let [a, b, c] = [1, 2, 3].map(|k| minus(at(positions, tet[k]), origin));
-    let n = cross(a, b);
-    n[0] * c[0] + n[1] * c[1] + n[2] * c[2]
 }

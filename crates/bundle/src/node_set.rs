@@ -2,7 +2,10 @@
 
 use serde::Deserialize;
 
-use field::memory::HeldBytes;
+use field::error::Result;
+use field::memory::{self, HeldBytes};
+
+const WHAT: &str = "a mesh";
 
 /// Nodes with a name: a support group, held nodes that move as one, apart from the others; or a region of the surface.
 #[derive(Debug, Clone, Deserialize, HeldBytes)]
@@ -28,4 +31,26 @@ impl NodeSet {
         let one = |set: &NodeSet| serde_json::json!({"name": set.name, "nodes": set.nodes.len()});
         sets.iter().map(one).collect()
     }
+}
+
+/// Ascending and each once.
+pub(super) fn unique(mut nodes: Vec<u32>) -> Vec<u32> {
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+/// Ascending and each once, of nodes below `count`: without sorting them, where they are many.
+pub(super) fn unique_below(count: usize, nodes: &[u32]) -> Result<Vec<u32>> {
+    let mut is_there = memory::filled(count, false, WHAT)?;
+    for &node in nodes {
+        is_there[node as usize] = true;
+    }
+    let mut found = memory::room(nodes.len().min(count), WHAT)?;
+    found.extend(
+        (0u32..)
+            .zip(&is_there)
+            .filter_map(|(node, is)| is.then_some(node)),
+    );
+    Ok(found)
 }

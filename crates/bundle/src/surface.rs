@@ -1,6 +1,7 @@
 //! The boundary of a mesh.
 
-use super::mesh::{at, cross, minus, unique};
+use super::geometry::{at, cross, minus};
+use super::node_set::unique;
 use field::error::Result;
 use field::memory::{self, HeldBytes};
 
