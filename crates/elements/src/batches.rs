@@ -49,7 +49,9 @@ pub struct Element {
 pub struct Source<'a> {
     /// By chunk-local slot, see `Partition::rest`.
     pub rest: &'a [[f32; 4]],
+    /// Elements, stiffness and laws by number in the mesh.
     pub mesh: Tetrahedra<'a>,
+    /// Its moduli go into the constants, times each element's stiffness.
     pub material: &'a Material,
     /// Whether gradients are asked for.
     pub gradients: bool,
@@ -69,6 +71,8 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         local: impl Fn(u32) -> u16,
     ) -> Result<Range<usize>, TryReserveError> {
         let start = self.batches.len();
+        // The order within a chunk is free: sums of forces at a node follow it, and it depends on
+        // the groups alone.
         let (groups, ends) = disjoint_batches(groups)?;
         grow(&mut self.batches, ends.len())?;
         grow(&mut self.elements, ends.len())?;
@@ -229,6 +233,8 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
     }
 
     /// Clusters in the batches.
+    ///
+    /// A cluster has all of its elements or none, so its first tells.
     pub fn count(&self) -> usize {
         let lanes = self.elements.iter().flat_map(|batch| batch[0]);
         lanes.filter(|element| *element != PADDING).count()
@@ -272,6 +278,7 @@ fn disjoint_batches<const NODES: usize, const TETS: usize>(
     Ok((all, ends))
 }
 
+/// Groups in the order in which they are packed, and where each batch of them ends.
 type Batches<const NODES: usize, const TETS: usize> = (Vec<Group<NODES, TETS>>, Vec<usize>);
 
 /// Entries of a symmetric matrix, in the order of [`Cluster::springs`].

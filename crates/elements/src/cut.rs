@@ -56,6 +56,7 @@ impl ElementForces {
         material: &Material,
     ) -> Result<Self, TryReserveError> {
         let mut partition = self.partition.copied(cut.positions.len())?;
+        // By element: asked for each lane of each batch below.
         let mut is_changed = filled(cut.tets.len(), false)?;
         for &element in cut.changed {
             is_changed[element as usize] = true;
@@ -65,6 +66,7 @@ impl ElementForces {
         let mut parents = Vec::new();
         // The chunk of each changed element, by its place in `changed`.
         let mut chunk_of = filled(cut.changed.len(), 0)?;
+        // Elements whose clusters are taken out of one chunk, the changed ones among them.
         let mut out = Vec::new();
         let mut packed = room(base)?;
         for at in 0..base {
@@ -112,6 +114,8 @@ impl ElementForces {
         }
         for (at, own) in packed.iter().enumerate() {
             let law = partition.chunks[at].law;
+            // No new chunk has more elements than an ordinary one: the numbers of its slots have to
+            // fit 16 bits.
             for own in own.chunks(CHUNK_ELEMENTS) {
                 partition.push_packed((own, law), cut.positions, material)?;
                 push(&mut parents, at as u32)?;
@@ -199,6 +203,7 @@ impl Partition {
 }
 
 impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
+    /// A copy of all lists, with room for what cuts put behind them.
     fn copied(&self) -> Result<Self, TryReserveError> {
         Ok(Kind {
             batches: copied_with_room(&self.batches)?,
@@ -226,6 +231,8 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
         out: &mut Vec<u32>,
     ) -> Result<(), TryReserveError> {
         let is_out = |element: u32| element != PADDING && is_changed[element as usize];
+        // Batches with a lane that has become free; they are given a shape below, once it is known
+        // which lanes stay.
         let mut touched = Vec::new();
         for batch in batches.clone() {
             let mut is_touched = false;
@@ -249,6 +256,8 @@ impl<const NODES: usize, const TETS: usize> Kind<NODES, TETS> {
             .clone()
             .find_map(|batch| Some((batch, live(batch)?)))
         else {
+            // No cluster of this kind is left in the chunk: its range becomes empty, and the
+            // batches lie there unused.
             batches.end = batches.start;
             return Ok(());
         };

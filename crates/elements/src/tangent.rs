@@ -194,6 +194,9 @@ impl Tetrahedron {
         self.stiffness_with(state, moduli, 0.0)
     }
 
+    /// `turning` is the part of the pressure's `kappa (J - 1) dcof F` that is taken: 1 or 0. The
+    /// formula of neo-Hookean tissue divides by powers of `J`, so flat and inverted elements take
+    /// the general one, which bounds it.
     fn stiffness_with(&self, state: &Deformation, moduli: Moduli, turning: f64) -> [[f64; 12]; 12] {
         let [a, b, c] = self.gradients;
         let gradients = [[0, 1, 2].map(|k| -(a[k] + b[k] + c[k])), a, b, c];
@@ -212,6 +215,8 @@ impl Tetrahedron {
     }
 
     /// `V g_a . tangent . g_b` of all corners.
+    ///
+    /// Block by block of `i` and `k`, since a corner's gradient meets `j` and `l` alone.
     fn contract(&self, tangent: &[[f64; 9]; 9], gradients: [[f64; 3]; 4]) -> [[f64; 12]; 12] {
         let mut out = [[0.0; 12]; 12];
         for i in 0..3 {

@@ -94,6 +94,8 @@ impl<L: NodeLanes> Strain<L> {
                 }
             }
             let t = a[0].add(a[3]).add(a[5]).mul(L::splat(1.0 / 3.0));
+            // `C = (1 + t)(1 + D)` with the mean `t` of the diagonal of `C - 1`: `D` has no trace,
+            // and the factor cancels in `Cbar`.
             let scale = L::splat(1.0).div(t.add(L::splat(1.0)).max(L::splat(LEAST)));
             for k in [0, 3, 5] {
                 a[k] = a[k].sub(t);
@@ -322,6 +324,8 @@ pub unsafe fn by_eigenvalues<L: NodeLanes>(law: &LaneTerms, strain: &Strain<L>) 
         let cube = r.mul(r).mul(r).max(L::splat(1e-30));
         let cosine = j3.mul(L::splat(0.5)).div(cube);
         let cosine = cosine.max(L::splat(-1.0)).min(L::splat(1.0));
+        // The three roots of the cubic `l³ - J2 l - J3 = 0` of a matrix without a trace, as twice
+        // `r = sqrt(J2 / 3)` times cosines 120 degrees apart.
         let [c, s] = third_of_angle(cosine);
         let first = r.add(r).mul(c);
         // 2 r cos(angle + 120 degrees).
@@ -337,6 +341,8 @@ pub unsafe fn by_eigenvalues<L: NodeLanes>(law: &LaneTerms, strain: &Strain<L>) 
         let lower = difference(law, log, [middle, last], [at_middle, at_last]);
         let small = L::splat(SMALL);
         let span = first.sub(last);
+        // Newton's form of the quadratic in `D` that has `T`'s eigenvalues at those of `D`: the
+        // coefficients of `D` and of `D²`.
         let squared = upper.sub(lower).div(span.max(small));
         let own = squared.mul_add(last, upper);
         let near = series(law, j2, j3, log);

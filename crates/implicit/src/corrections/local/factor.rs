@@ -87,6 +87,11 @@ impl NearFactor {
     }
 
     /// Which nodes share an element with each of the core, and where the blocks of each element go.
+    ///
+    /// Three passes. The elements at each row are counted, which gives where the lists of rows
+    /// start; then they are listed; then each row gathers the columns of its elements, sorted, and
+    /// every element is told where its blocks lie in that row. Numbers are added through that table
+    /// afterwards, without any search.
     fn fill_rows(&mut self, near: &NearSet) -> Result<()> {
         let (rows, core) = (&mut self.rows, near.places.core);
         let is_core = |place: &u32| (*place as usize) < core;
@@ -150,6 +155,8 @@ impl NearFactor {
                     *target = entry_of.get(column as usize).copied().unwrap_or(NONE);
                 }
             }
+            // Only the entries of this row are taken back, so that a row costs what it has and not
+            // what is near.
             for &column in columns.iter() {
                 entry_of[column as usize] = NONE;
             }
@@ -181,6 +188,10 @@ impl NearFactor {
     }
 
     /// Makes the factor of the tangent at a state, unless it is that already.
+    ///
+    /// Between two states the pattern stays and numbers alone change. The number of the factor
+    /// rises with each that is made, so that what others have computed with an older one is known
+    /// to be of it.
     pub fn make(
         &mut self,
         (env, near, far): (Env<'_>, &NearSet, &FarField),
@@ -192,6 +203,8 @@ impl NearFactor {
         if self.made == *at {
             return Ok(());
         }
+        // Until an attempt succeeds there is no factor: after an error nothing may be solved with
+        // half of one.
         self.made.clear();
         *last += 1;
         self.generation = *last;
@@ -248,6 +261,7 @@ impl NearFactor {
             add(&mut self.rows.blocks, targets, &stiffness);
         }
         for (row, &node) in near.places.nodes[..near.places.core].iter().enumerate() {
+            // The inertia is not scaled up with the diagonal: it is positive by itself.
             let inertia = kappa * env.body.mass[node as usize];
             if let Some(own) = self.rows.position(row, row as u32) {
                 for axis in 0..3 {
@@ -299,6 +313,8 @@ impl NearFactor {
     }
 
     /// The entries of a row beyond the core: the last ones.
+    ///
+    /// Columns of a row are sorted, and the core's places come before the others.
     fn each_around(&self, row: usize, mut take: impl FnMut(usize, &[f32; 9])) {
         let core = self.rows.rows() as u32;
         let columns = self.rows.row(row);
