@@ -1,4 +1,9 @@
 //! The mesh of a body that has been cut.
+//!
+//! A cut adds nodes and elements behind those that are there and never renumbers a node: loads,
+//! points and hosts name nodes of the intact mesh for as long as a scene lives. Elements are
+//! numbered anew, the whole ones in their old order without those that changed, and then the cells;
+//! laws and directions go through the same order.
 
 use topology::{Body, Changes, Skin};
 
@@ -44,6 +49,8 @@ impl Mesh {
         }
         let whole = self.tets.len() / 4;
         let mut tets = memory::room(4 * (whole + new.len()), WHAT)?;
+        // `gone` is ascending: each stretch of elements between two of its numbers is copied at
+        // once.
         let ends = gone.iter().map(|element| *element as usize);
         let mut start = 0;
         for end in ends.chain([whole]) {
@@ -61,6 +68,7 @@ impl Mesh {
         left.extend(new.iter().flat_map(|element| element.nodes));
         let left = unique(left);
         let mesh = body.mesh();
+        // Whether any tissue is left at a node: an element that stays, or a new one.
         let is_left = |node: u32| {
             let is_around = |element: &u32| gone.binary_search(element).is_err();
             let stays = (node as usize) < own && mesh.around(node).iter().any(is_around);
@@ -71,6 +79,7 @@ impl Mesh {
         let mut held_nodes = memory::copied(&self.held_nodes, WHAT)?;
         for node in corners.chain(copies) {
             let is_held = self.held_nodes.binary_search(&body.parent(node)).is_ok();
+            // A node without tissue has no stiffness: free, it would make the equations singular.
             if is_held || !is_left(node) {
                 memory::push(&mut held_nodes, node, WHAT)?;
             }
@@ -102,6 +111,8 @@ impl Mesh {
         })
     }
 
+    /// All that bounds the cut body. The border of the intact mesh is found at the first cut and
+    /// kept with it.
     fn bounds(&self, body: &Body, skin: &Skin) -> Result<Bounds> {
         let border = match self.domain.opened.border.get() {
             Some(border) => border,
@@ -123,6 +134,8 @@ impl Mesh {
         })
     }
 
+    /// The domain's triangles as faces of elements, found by their sorted corners; like the border
+    /// they are kept.
     fn domain_sides(&self, body: &Body) -> Result<&[(u32, u8)]> {
         if let Some(sides) = self.domain.opened.domain_sides.get() {
             return Ok(sides);

@@ -1,4 +1,9 @@
 //! What tools may touch of a body: whole faces, and on a cut body what a blade has laid open.
+//!
+//! The bundle names faces of the boundary. A cut leaves some of them whole, others in part, and
+//! adds walls; what is not a whole face any more is given as pieces, whose corners are weighted
+//! sums of nodes and not nodes. Lists that a cut has to look up again and again are kept in the
+//! intact mesh from the first cut on.
 
 use std::sync::OnceLock;
 
@@ -48,6 +53,7 @@ pub struct Opened {
     /// The mesh's border as faces of elements, likewise.
     #[held(skip)]
     pub(super) border: OnceLock<Vec<(u32, u8)>>,
+    /// The whole skin of the cut body, the domain and what is beside it.
     pub bounds: Bounds,
 }
 
@@ -56,6 +62,7 @@ pub struct Opened {
 pub struct Bounds {
     /// Nodes of the faces, ascending.
     pub nodes: Vec<u32>,
+    /// Whole triangles of nodes, outward.
     pub faces: Vec<[u32; 3]>,
     /// Nodes and weights.
     pub corners: Vec<([u32; 4], [f32; 4])>,

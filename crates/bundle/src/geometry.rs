@@ -1,5 +1,6 @@
 //! Areas and volumes by rest positions `[K,3]`, mm, in f64.
 
+/// Where a node is at rest. In f64 a difference of two f32 positions keeps its digits.
 pub(super) fn at(positions: &[f32], node: u32) -> [f64; 3] {
     let i = 3 * node as usize;
     [
@@ -21,7 +22,8 @@ pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Six times the signed volume of a tetrahedron.
+/// Six times the signed volume of a tetrahedron. Positive where the first three corners turn
+/// counter-clockwise as seen from the fourth.
 pub fn volume(positions: &[f32], tet: &[u32]) -> f64 {
     let origin = at(positions, tet[0]);
     let [a, b, c] = [1, 2, 3].map(|k| minus(at(positions, tet[k]), origin));

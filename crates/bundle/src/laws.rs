@@ -96,6 +96,8 @@ impl ElementLaws {
     pub(super) fn cut(&self, whole: usize, changes: &Changes) -> Result<ElementLaws> {
         let Changes { gone, new } = changes;
         let most = whole + new.len();
+        // The stiffness is always written out: a cell has its share of an element's, also where the
+        // body is uniform.
         let room = |is_empty: bool| if is_empty { 0 } else { most };
         let mut stiffness = memory::room(most, WHAT)?;
         let mut of_tet = memory::room(room(self.of_tet.is_empty()), WHAT)?;

@@ -16,6 +16,7 @@ use safetensors::Dtype;
 
 const WHAT: &str = "a mesh";
 /// Support groups at most.
+/// Which groups are let go is kept as one bit each in a `u64`. Named regions have the same limit.
 const MOST_SUPPORTS: usize = 64;
 
 /// A checked mesh; lengths in mm.
@@ -43,6 +44,13 @@ pub struct Mesh {
 
 impl Mesh {
     /// Reads and checks a mesh.
+    ///
+    /// `boundary` says which of the file's two lists of nodes are held: the fixed ones, or the
+    /// supported ones as well. Groups and regions are named by the manifest and come later
+    /// ([`Mesh::take_named`]).
+    ///
+    /// # Errors
+    /// [`Error::Version`], and [`Error::Bundle`] with the tensor and the element that is at fault.
     pub fn parse(file: &TensorFile, boundary: Boundary) -> Result<Mesh> {
         let text = file.text();
         if text.get("format").map(String::as_str) != Some("upt-mesh") {
@@ -92,6 +100,9 @@ impl Mesh {
         };
         let fixed = set("fixed")?;
         let supported = set("supported")?;
+        // Of what the motion depends on, in a fixed order: a list that is absent adds nothing, so
+        // that meshes from before it existed keep their hash. The surface is left out, since the
+        // tetrahedra have it.
         let mut hash = Sha256::new();
         hash.update(file.raw("positions", Dtype::F32, &[None, Some(3)])?);
         hash.update(file.raw("tets", Dtype::I32, &[None, Some(4)])?);
@@ -162,6 +173,7 @@ impl Mesh {
             return bad(MOST_SUPPORTS, format!("is one more than {MOST_SUPPORTS}"));
         }
         for (index, group) in groups.iter().enumerate() {
+            // Each pair of groups is compared once, by the later one.
             let others = &groups[..index];
             if group.name.is_empty() || others.iter().any(|other| other.name == group.name) {
                 return bad(
@@ -203,6 +215,8 @@ impl Mesh {
             return bad(MOST_SUPPORTS, format!("is one more than {MOST_SUPPORTS}"));
         }
         for (index, region) in regions.iter().enumerate() {
+            // Unlike groups, regions may overlap: they are names for parts of the surface, and move
+            // nothing.
             let mut others = regions[..index].iter();
             if region.name.is_empty() || others.any(|other| other.name == region.name) {
                 return bad(

@@ -47,6 +47,8 @@ impl Surface {
     }
 }
 
+/// Half of the cross product is a triangle's area, and each of its corners takes a third: the sum
+/// over all nodes is the area of the surface. Sums are in f64 and rounded once.
 fn node_area(positions: &[f32], faces: &[u32]) -> Result<Vec<f32>> {
     let count = positions.len() / 3;
     let mut area = memory::filled(count, 0.0f64, WHAT)?;
