@@ -5,8 +5,10 @@
 //! with, and how the modes move. The copy is made here, in the thread that steps, and handed over
 //! by an exchange of three buffers (`exchange`) in which neither side waits for the other.
 
+mod leaving;
 mod link;
 mod motion;
+mod near;
 mod softened;
 mod stepped;
 mod tied;
@@ -15,14 +17,16 @@ pub mod tissue;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use ::contact::{Placed, Pose, Sample, Samples, Search, Vector};
+use ::contact::{Sample, Samples, Search, Vector};
 use exchange::exchange;
 
 pub use self::link::Link;
 pub use self::stepped::Stepped;
 
-use self::link::{FeltTool, HandLine, NearSamples};
+use self::leaving::{Leaving, Modal};
+use self::link::{FeltTool, HandLine};
 use self::motion::{Carried, ModalRoom};
+use self::near::NearSamples;
 use self::softened::Softened;
 use self::tied::OwnTies;
 use super::HapticOptions;
@@ -30,7 +34,7 @@ use super::ends::Ends;
 use super::modes::Modes;
 use super::render::Haptics;
 use super::snapshot::{ContactSnapshot, Facing, MOST_SAMPLES};
-use crate::contact::{Compliance, Delassus, Mode, PUT_MM, Pair, State, vector};
+use crate::contact::{Compliance, Delassus, Mode, Pair, State};
 use crate::corrections::{Corrections, Integrator};
 use crate::error::{Error, Result};
 use crate::memory::{self, HeldBytes};
@@ -103,6 +107,7 @@ pub fn join(
         },
         carried: Carried::default(),
         ties: OwnTies::default(),
+        leaving: Leaving::default(),
     };
     let haptics = Haptics::new(options, modes, snapshot, at, ends)?;
     Ok((link, haptics))
@@ -169,7 +174,10 @@ impl Link {
     /// # Errors
     /// [`Error::OutOfMemory`]; [`Error::Panic`] of a worker. The problem before stays.
     pub fn publish(&mut self, step: &Stepped<'_>) -> Result<()> {
-        self.find(step)?;
+        self.ties.find(step.problem, self.tool.instrument)?;
+        let pose = *self.line.pose.read();
+        let last = self.line.last_pose.replace(pose).unwrap_or(pose);
+        (self.near).find(step, &self.tool, self.ties.rows(), [&last, &pose])?;
         let held = &step.corrections.body.held.is;
         let compliance = Compliance::at_rest(
             step.prior,
@@ -228,6 +236,7 @@ impl Link {
             .and_then(|problem| Some((&problem.past, problem.past.tools.get(index)?)));
         snapshot.pose = past.map(|(_, tool)| tool.pose);
         snapshot.samples.count = self.near.found.len();
+        self.leaving.begin(self.near.found.len(), modes)?;
         for (at, &(_, row)) in self.near.found.iter().enumerate() {
             let tie = self.ties.of(row);
             let sample = self.ties.sample(&self.near.samples, row);
@@ -258,6 +267,11 @@ impl Link {
             snapshot.samples.ties[at] = tie;
             snapshot.samples.forces[at] = force;
             snapshot.samples.anchors[at] = anchor;
+            if let (None, None, Some(pose)) = (anchor, tie, &snapshot.pose) {
+                let moves = (point, snapshot.samples.carried[at]);
+                let tool = (&self.tool.body, pose);
+                (self.leaving).take(at, moves, force, tool, step.integrator.step_s);
+            }
             // What the step's solve left, which the hand must not feel as a motion.
             snapshot.samples.errors[at] = snapshot.pose.map_or(Vector::ZERO, |pose| {
                 if let Some(tie) = &tie {
@@ -285,85 +299,16 @@ impl Link {
                 }
             });
         }
+        let modal = Modal {
+            at_samples: &snapshot.modes.at_samples,
+            masses: &self.modal.masses,
+            velocity: &mut snapshot.modes.velocity,
+        };
+        self.leaving.hold(snapshot.pose, modal);
         self.line.number += 1;
         snapshot.number = self.line.number;
         snapshot.latency_s = self.line.latency_s.unwrap_or(step.took_s);
         self.line.out.publish();
-        Ok(())
-    }
-
-    /// The samples that are pushed or held by the tool, and the nearest to where the hand is now.
-    fn find(&mut self, step: &Stepped<'_>) -> Result<()> {
-        let pose = *self.line.pose.read();
-        self.near.found.clear();
-        self.ties.find(step.problem, self.tool.instrument)?;
-        memory::fit(&mut self.near.found, self.ties.rows().count(), WHAT)?;
-        self.near
-            .found
-            .extend(self.ties.rows().map(|row| (f32::MIN, row)));
-        let index = self.tool.instrument as usize;
-        if let Some(problem) = step.problem {
-            let past = &problem.past;
-            let anchors = past.tools.get(index).map(|tool| tool.grasp.anchors().len());
-            let more = past.forces.len() + anchors.unwrap_or(0);
-            memory::reserve(&mut self.near.found, more, WHAT)?;
-            let own = problem.past.forces.iter();
-            let own = own.filter(|force| force.tool == self.tool.instrument);
-            self.near
-                .found
-                .extend(own.map(|force| (f32::MIN, force.sample)));
-            if let Some(tool) = problem.past.tools.get(index)
-                && self.tool.grasps
-            {
-                let anchors = tool.grasp.anchors().iter();
-                self.near
-                    .found
-                    .extend(anchors.map(|anchor| (f32::MIN, anchor.sample)));
-            }
-        }
-        // A quick hand is elsewhere before the next state: what lies on its way, if it goes on as it did, is within reach too.
-        let last = self.line.last_pose.replace(pose).unwrap_or(pose);
-        let ahead = pose.translation - last.translation;
-        let on = |part: f32| Pose::from_parts(pose.translation + ahead * part, pose.rotation);
-        let is_quick = ahead.length() > REACH_MM;
-        let position = |node| vector(step.rest, node) + vector(step.u, node);
-        // One that starts suddenly may be at the nearest part of the surface before the next state.
-        let nodes = self.near.samples.all_nodes().iter();
-        let gaps = nodes.map(|node| self.tool.body.nearest_at(&pose, position(*node)).distance);
-        let gap = gaps.fold(f32::MAX, f32::min);
-        let gap = if gap <= PUT_MM { gap.max(0.0) } else { 0.0 };
-        let placed = Placed {
-            body: &self.tool.body,
-            pose: if is_quick { on(0.5) } else { pose },
-            skin: REACH_MM + gap.max(if is_quick { 0.5 * ahead.length() } else { 0.0 }),
-        };
-        let near = self
-            .near
-            .search
-            .find(&self.near.samples, &[placed], position);
-        memory::reserve(&mut self.near.found, near.len(), WHAT)?;
-        let body = &self.tool.body;
-        let near = near.iter().map(|near| {
-            let ways = (0..=8).map(|part| on(part as f32 / 8.0));
-            let distance = match is_quick {
-                true => ways.fold(f32::MAX, |least, pose| {
-                    least.min(body.nearest_at(&pose, near.point).distance)
-                }),
-                false => near.distance,
-            };
-            (distance, near.sample)
-        });
-        self.near.found.extend(near);
-        // Of equals the pushed one comes first, and stays.
-        self.near
-            .found
-            .sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
-        self.near.found.dedup_by_key(|found| found.1);
-        self.near
-            .found
-            .sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        self.near.found.truncate(MOST_SAMPLES);
-        self.near.found.sort_unstable_by_key(|found| found.1);
         Ok(())
     }
 

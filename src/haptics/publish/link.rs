@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use ::contact::{Body, Pose, Samples, Search};
+use ::contact::{Body, Pose};
 use exchange::{Reader, Writer};
 
+use super::leaving::Leaving;
 use super::motion::{Carried, ModalRoom};
+use super::near::NearSamples;
 use super::softened::Softened;
 use super::tied::OwnTies;
 use crate::contact::Delassus;
@@ -30,6 +32,8 @@ pub struct Link {
     pub(super) carried: Carried,
     /// The ties that end on this tool: they are published as samples are.
     pub(super) ties: OwnTies,
+    /// What the tool pushes does not fly off it.
+    pub(super) leaving: Leaving,
 }
 
 /// The tool as the scene's list has it.
@@ -64,17 +68,4 @@ pub(super) struct HandLine {
     pub(super) latency_s: Option<f64>,
     /// Where the hand was when the last state was published.
     pub(super) last_pose: Option<Pose>,
-}
-
-/// Which samples are published.
-#[derive(HeldBytes)]
-pub(super) struct NearSamples {
-    /// All samples of the body's surface.
-    #[held(skip)]
-    pub(super) samples: Arc<Samples>,
-    pub(super) search: Search,
-    /// Nearest samples by distance, mm, and row, at most [`super::MOST_SAMPLES`], and their rows alone, in the same order. A sample that is pushed or held has
-    /// the least distance, so that it is never left out.
-    pub(super) found: Vec<(f32, u32)>,
-    pub(super) sampled: Vec<u32>,
 }

@@ -55,7 +55,7 @@ impl OwnTies {
     }
 
     /// Their rows.
-    pub fn rows(&self) -> impl Iterator<Item = u32> {
+    pub fn rows(&self) -> impl Iterator<Item = u32> + Clone {
         self.own.iter().map(|index| row_of(*index as usize))
     }
 

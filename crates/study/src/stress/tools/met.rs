@@ -1,11 +1,12 @@
 //! What a tool met at its places: at the ends of the steps, in the frames between them, and in a hand at 1 kHz.
 
 use anyhow::Result;
-use contact::{Body, Pose, pose};
-use tissue::solver::{Tool, ToolPose};
+use contact::Body;
+use tissue::solver::ToolPose;
 use upt::flag;
 
 use super::run::Hands;
+use super::way::Way;
 use crate::stress::Row;
 
 /// How deep a tool may lie in the tissue, and how deep is the goal, mm.
@@ -13,24 +14,11 @@ const MOST_MM: f64 = 1.0;
 const GOAL_MM: f64 = 0.3;
 /// Frames that are shown between two steps.
 const FRAMES: usize = 2;
-/// A hand may miss the tissue for so many calls, ms, and for more in one place, and one more of so many: where a step loses the tool, the hand does.
+/// A hand may miss the tissue for so many calls, ms, or for as long as the truth does, where quick tissue flies off; and for more in one place, and one more of so many.
 const MISSED: usize = 5;
 const HANDS: usize = 100;
-/// A tool so far beneath the surface at rest must be met, mm.
-const BENEATH_MM: f32 = 0.6;
 /// Part of a step that passes before its state reaches the hand.
 const LATENCY: f32 = 0.5;
-
-/// The way of a tool to a place.
-pub struct Way {
-    pub tool: Tool,
-    /// By step, and how high its end is then above the surface at rest, mm.
-    pub poses: Vec<(ToolPose, f32)>,
-    /// It leaps: a hand must feel it once the step has arrived.
-    pub leaps: bool,
-    /// It begins in the tissue: it must be told of in the first step and held in the last, and no frame or hand is asked.
-    pub begins_in_tissue: bool,
-}
 
 /// How deep tools lay at the ends of steps, or in frames.
 #[derive(Default)]
@@ -70,6 +58,8 @@ pub struct Met {
     /// Met by a hand, and the most calls one after another in which none of them was: quick tissue may fly off for a moment.
     felt: usize,
     most_missed: usize,
+    /// Places in which the hand missed it for longer than [`MISSED`], but the truth's tool for as long.
+    missed_in_truth: usize,
     /// Deeper than [`MOST_MM`] without a flag.
     silent: usize,
     error: Option<String>,
@@ -151,7 +141,9 @@ impl Met {
         }
         self.found += usize::from(found);
         self.told += usize::from(told);
-        self.felt += usize::from(most_missed <= MISSED);
+        let flies_off = most_missed > MISSED && way.true_miss(hands)? >= Some(most_missed);
+        self.missed_in_truth += usize::from(flies_off);
+        self.felt += usize::from(most_missed <= MISSED || flies_off);
         self.most_missed = self.most_missed.max(most_missed);
         self.steps.add(deepest);
         self.frames.add(deepest_shown);
@@ -176,6 +168,12 @@ impl Met {
                 self.felt,
                 self.most_missed
             );
+            if self.missed_in_truth > 0 {
+                text += &format!(
+                    ", in the truth as long in {} of these",
+                    self.missed_in_truth
+                );
+            }
         }
         if let Some(error) = &self.error {
             text += &format!("; error: {error}");
@@ -191,24 +189,5 @@ impl Met {
         };
         let good = self.error.is_none() && met;
         Row::new(&hands.bench.subject, name, text, good)
-    }
-}
-
-impl Way {
-    /// Where the tool is so many steps after the first, and whether it must be met there.
-    fn at(&self, time: f32) -> (Pose, bool) {
-        let last = self.poses.len() - 1;
-        let step = (time as usize).min(last);
-        let part = time - step as f32;
-        let ((from, high), (to, low)) = (self.poses[step], self.poses[(step + 1).min(last)]);
-        let height = high + (low - high) * part;
-        let pose = pose::between(&from.pose, &to.pose, part);
-        (pose, height <= -BENEATH_MM)
-    }
-
-    /// The first step at whose end it must be met.
-    pub fn first(&self) -> usize {
-        let met = |step: &usize| self.at(*step as f32).1;
-        (0..self.poses.len()).find(met).unwrap_or(0)
     }
 }

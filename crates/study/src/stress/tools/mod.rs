@@ -10,6 +10,7 @@ mod run;
 mod sudden;
 mod thrust;
 mod truth;
+mod way;
 
 use std::path::Path;
 

@@ -7,9 +7,10 @@ use tissue::schemes::SplitMix;
 use tissue::solver::Tool;
 
 use super::hand::{Site, at, between, sites, tool};
-use super::met::{Met, Way};
+use super::met::Met;
 use super::run::Hands;
 use super::truth;
+use super::way::Way;
 use crate::stress::Row;
 
 /// Places of each row.

@@ -1,11 +1,10 @@
 //! Tools beside the reference solver: how deep each lies where both go the same way.
 
 use anyhow::Result;
-use contact::Body;
-use tissue::solver::{Solver, SolverOptions};
 
-use super::met::{Met, Way};
+use super::met::Met;
 use super::run::Hands;
+use super::way::Way;
 use crate::stress::Row;
 
 /// Places of a row: the solver takes seconds at each.
@@ -23,7 +22,7 @@ pub(super) fn row(hands: &mut Hands, name: &str, ways: &[Way]) -> Result<Row> {
         if places == most {
             break;
         }
-        let Some(true_mm) = deepest(hands, way)? else {
+        let Some(true_mm) = way.true_depth(hands)? else {
             ended += 1;
             continue;
         };
@@ -39,33 +38,4 @@ pub(super) fn row(hands: &mut Hands, name: &str, ways: &[Way]) -> Result<Row> {
     let name = format!("{name}, beside the truth");
     let good = held == places && held > 0;
     Ok(Row::new(&hands.bench.subject, &name, text, good))
-}
-
-/// How deep the tool lies in the solver's tissue, mm, by what the solver tells too, as of the library; none where its elements invert.
-fn deepest(hands: &mut Hands, way: &Way) -> Result<Option<f64>> {
-    let (mesh, boundary) = (&hands.bench.mesh, hands.bench.boundary);
-    let options = SolverOptions {
-        material: hands.bench.model.manifest.material,
-        ..SolverOptions::default()
-    };
-    let mut solver = Solver::new(mesh, boundary, options)?;
-    let tools = std::slice::from_ref(&way.tool);
-    solver.set_tools(mesh.samples(boundary), tools, &[way.poses[0].0.pose])?;
-    let body = [Body::new(&way.tool.shape)?];
-    let mut field = vec![[0.0; 3]; hands.field.len()];
-    let mut deepest = 0.0f64;
-    for (step, (at, _)) in way.poses.iter().enumerate().skip(1) {
-        let report = match solver.step_tools(&[], &[*at], hands.step_s) {
-            Ok(report) => report,
-            Err(error) if error.is_load() => return Ok(None),
-            Err(error) => return Err(error.into()),
-        };
-        if step >= way.first() {
-            solver.displacement(&mut field);
-            let depth = hands.yard.penetration(&field, &body, &[at.pose]);
-            let told = report.tools.iter().map(|tool| tool.penetration_mm.into());
-            deepest = told.fold(deepest.max(depth), f64::max);
-        }
-    }
-    Ok(Some(deepest))
 }
