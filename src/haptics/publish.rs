@@ -24,9 +24,9 @@ pub use self::link::Link;
 pub use self::stepped::Stepped;
 
 use self::leaving::{Leaving, Modal};
-use self::link::{FeltTool, HandLine};
+use self::link::HandLine;
 use self::motion::{Carried, ModalRoom};
-use self::near::NearSamples;
+use self::near::{FeltTool, NearSamples};
 use self::softened::Softened;
 use self::tied::OwnTies;
 use super::HapticOptions;
@@ -41,9 +41,6 @@ use crate::memory::{self, HeldBytes};
 use crate::prior::PriorTable;
 
 const WHAT: &str = "the haptics of a scene";
-/// Samples this near to the tool are published, mm: what it may reach before the next step. At 20
-/// ms a step that is a hand of 0.3 m/s; a quicker one widens it, see [`Link::find`].
-const REACH_MM: f32 = 6.0;
 /// Time over which samples move at once, s: the modes take no part.
 const AT_ONCE_S: f64 = 1e-3;
 

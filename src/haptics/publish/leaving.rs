@@ -7,11 +7,11 @@
 
 use ::contact::{Body, Pose, Vector};
 
-use super::WHAT;
 use crate::contact::PUT_MM;
 use crate::error::Result;
 use crate::memory::{self, HeldBytes};
 
+const WHAT: &str = "the haptics of a scene";
 /// A pushed sample may leave its tool as fast, mm/s: steps err by as much where a hand presses. With 0 the forces of presses err by 1.2 for 0.7 %.
 const MOST_MM_S: f32 = 10.0;
 /// Gauss-Seidel sweeps over the samples; few are pushed at once.

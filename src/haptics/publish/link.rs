@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use ::contact::{Body, Pose};
+use ::contact::Pose;
 use exchange::{Reader, Writer};
 
 use super::leaving::Leaving;
 use super::motion::{Carried, ModalRoom};
-use super::near::NearSamples;
+use super::near::{FeltTool, NearSamples};
 use super::softened::Softened;
 use super::tied::OwnTies;
 use crate::contact::Delassus;
@@ -34,19 +34,6 @@ pub struct Link {
     pub(super) ties: OwnTies,
     /// What the tool pushes does not fly off it.
     pub(super) leaving: Leaving,
-}
-
-/// The tool as the scene's list has it.
-#[derive(HeldBytes)]
-pub(super) struct FeltTool {
-    /// Its place in the list of the scene's tools: forces and grasps of that place are its own.
-    pub(super) instrument: u32,
-    #[held(skip)]
-    pub(super) body: Body,
-    /// Coulomb's coefficient.
-    pub(super) friction: f32,
-    /// Whether it holds what it touches: then its anchors are published, too.
-    pub(super) grasps: bool,
 }
 
 /// What goes to the hand's thread and comes from it. Neither end ever waits for the other ([`exchange`]).

@@ -2,15 +2,31 @@
 
 use std::sync::Arc;
 
-use ::contact::{Placed, Pose, Samples, Search};
+use ::contact::{Body, Placed, Pose, Samples, Search};
 
-use super::link::FeltTool;
 use super::stepped::Stepped;
-use super::{REACH_MM, WHAT};
 use crate::contact::{PUT_MM, vector};
 use crate::error::Result;
 use crate::haptics::snapshot::MOST_SAMPLES;
 use crate::memory::{self, HeldBytes};
+
+const WHAT: &str = "the haptics of a scene";
+/// Samples this near to the tool are published, mm: what it may reach before the next step. At 20
+/// ms a step that is a hand of 0.3 m/s; a quicker one widens it, see [`NearSamples::find`].
+const REACH_MM: f32 = 6.0;
+
+/// The tool as the scene's list has it.
+#[derive(HeldBytes)]
+pub(super) struct FeltTool {
+    /// Its place in the list of the scene's tools: forces and grasps of that place are its own.
+    pub(super) instrument: u32,
+    #[held(skip)]
+    pub(super) body: Body,
+    /// Coulomb's coefficient.
+    pub(super) friction: f32,
+    /// Whether it holds what it touches: then its anchors are published, too.
+    pub(super) grasps: bool,
+}
 
 /// Which samples are published.
 #[derive(HeldBytes)]
@@ -19,7 +35,7 @@ pub(super) struct NearSamples {
     #[held(skip)]
     pub(super) samples: Arc<Samples>,
     pub(super) search: Search,
-    /// Nearest samples by distance, mm, and row, at most [`super::MOST_SAMPLES`], and their rows alone, in the same order. A sample that is pushed or held has
+    /// Nearest samples by distance, mm, and row, at most [`MOST_SAMPLES`], and their rows alone, in the same order. A sample that is pushed or held has
     /// the least distance, so that it is never left out.
     pub(super) found: Vec<(f32, u32)>,
     pub(super) sampled: Vec<u32>,
