@@ -67,7 +67,7 @@ impl Scene {
     /// [`Error::Busy`], [`Error::OutOfMemory`].
     pub fn update_surface(&self) -> Result<SurfaceUpdate> {
         let mut held = lock(&self.tools.surface)?;
-        self.with(|core, published| {
+        self.core()?.call(|core, published| {
             let body = lock_read(published).body.number;
             let (first_vertex, is_new) = match &mut *held {
                 Some(own) if own.is_of(body) => {

@@ -98,7 +98,7 @@ impl Scene {
             }),
         });
         let line = |recorder: &mut Recorder| recorder.open(&line);
-        let change = self.told(line, |core, published| {
+        let change = self.core()?.told(Some(line), |core, published| {
             core.change(published, |body, at| {
                 body.cut_with(blade, &sweep, stroke, at)
             })
@@ -124,7 +124,7 @@ impl Scene {
                 most_mm3,
             }))
         };
-        let change = self.told(line, |core, published| {
+        let change = self.core()?.told(Some(line), |core, published| {
             core.change(published, |body, at| {
                 body.remove(depth, f64::from(most_mm3), at)
             })
@@ -146,7 +146,7 @@ impl Scene {
             most,
         });
         let line = |recorder: &mut Recorder| recorder.open(&line);
-        let change = self.told(line, |core, published| {
+        let change = self.core()?.told(Some(line), |core, published| {
             core.change(published, |body, at| {
                 body.tear(f64::from(stretch), most as usize, stroke, at)
             })
@@ -165,7 +165,7 @@ impl Scene {
             factor,
         });
         let line = |recorder: &mut Recorder| recorder.open(&line);
-        let change = self.told(line, |core, published| {
+        let change = self.core()?.told(Some(line), |core, published| {
             core.change(published, |body, _| body.scale_stiffness(elements, factor))
         });
         change.map(Cut::from)
@@ -178,7 +178,7 @@ impl Scene {
     pub fn drop_fragments(&self) -> Result<Vec<f32>> {
         let _frames = self.hold_frames(true)?;
         let line = |recorder: &mut Recorder| recorder.open(&Line::DropFragments {});
-        self.told(line, |core, published| {
+        self.core()?.told(Some(line), |core, published| {
             let Some(cut) = &core.maker.body.cut else {
                 return Ok(Vec::new());
             };

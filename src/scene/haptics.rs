@@ -43,7 +43,8 @@ impl Scene {
     /// [`Error::Argument`] for the tool, an option, or one hand too many; [`Error::Unsupported`] for a bundle without linear response or
     /// corrections and a scene that does not correct; [`Error::Busy`] while the scene is used or a step is in flight.
     pub fn haptics(&self, options: &HapticOptions) -> Result<Haptics> {
-        self.with(|core, published| core.add_hand(published, options))
+        self.core()?
+            .call(|core, published| core.add_hand(published, options))
     }
 }
 

@@ -98,12 +98,11 @@ use crate::replay::Recorder;
 use crate::replay::base64::Bytes;
 use crate::replay::lines::Line;
 use build::build;
-use core::Core;
 use points::AttachedPoints;
 use published::Published;
 use published::lock_read;
 use region::check_nodes;
-use shared::Shared;
+use shared::{CoreGuard, Shared};
 use worker::Worker;
 
 /// A tissue that is stepped. All methods take `&self`; concurrent use gives [`Error::Busy`], never a wait.
@@ -179,27 +178,24 @@ impl Scene {
         lock_read(&self.shared.published).last.field.len() / 3
     }
 
-    /// Calls with the core, where no submitted step is in flight and no other thread has it.
+    /// The core for one call, where no submitted step is in flight and no other thread has it.
     ///
     /// # Errors
-    /// [`Error::Busy`], [`Error::Panic`] once one was caught.
-    fn with<T>(
-        &self,
-        call: impl FnOnce(&mut Core, &std::sync::RwLock<Published>) -> Result<T>,
-    ) -> Result<T> {
+    /// [`Error::Busy`].
+    fn core(&self) -> Result<CoreGuard<'_>> {
         if self.worker.in_flight() {
             return Err(Error::Busy(
                 "a submitted step is in flight; poll or wait first".into(),
             ));
         }
-        self.shared.guarded(self.shared.core()?, call)
+        self.shared.core()
     }
 
     /// Back to rest; region and points stay.
     pub fn reset(&self) -> Result<()> {
         let _frames = self.hold_frames(lock_read(&self.shared.published).body.cut.is_some())?;
         let line = |recorder: &mut Recorder| recorder.open(&Line::Reset {});
-        self.told(line, |core, published| {
+        self.core()?.told(Some(line), |core, published| {
             core.reset(published)?;
             self.tools.reset();
             Ok(())
@@ -240,7 +236,9 @@ impl Scene {
     /// [`Scene::step`] into memory that need not be initialised.
     pub(crate) fn step_to(&self, input: StepInput<'_>, out: Option<Output<'_, f32>>) -> Result<()> {
         let line = |recorder: &mut Recorder| record::step(recorder, &input);
-        self.told(line, |core, published| core.step(published, input, out))
+        self.core()?.told(Some(line), |core, published| {
+            core.step(published, input, out)
+        })
     }
 
     /// Restricts output to these nodes (any order); `None` is all nodes. Both published states are decoded for the new
@@ -260,7 +258,7 @@ impl Scene {
     pub fn set_region(&self, nodes: Option<&[u32]>) -> Result<()> {
         let line = Line::Region(nodes.map(Cow::Borrowed));
         let line = |recorder: &mut Recorder| recorder.open(&line);
-        self.told(line, |core, published| {
+        self.core()?.told(Some(line), |core, published| {
             if let Some(nodes) = nodes {
                 check_nodes(nodes, core.maker.body.mesh.node_count())?;
             }
@@ -287,7 +285,7 @@ impl Scene {
     /// # upt::Result::Ok(())
     /// ```
     pub fn attach_points(&self, points: Option<&[f32]>) -> Result<()> {
-        self.with(|core, published| {
+        self.core()?.call(|core, published| {
             let maker = &core.maker;
             let mesh = maker.body.intact_mesh();
             let mut points = match points {
@@ -363,7 +361,7 @@ impl Scene {
     /// # upt::Result::Ok(())
     /// ```
     pub fn save(&self) -> Result<Vec<u8>> {
-        self.with(|core, published| core.save(published))
+        self.core()?.call(|core, published| core.save(published))
     }
 
     /// Restores a snapshot.
@@ -375,7 +373,8 @@ impl Scene {
         let _frames = self.hold_frames(is_cut || snapshot::has_body(bytes))?;
         let line = Line::Restore(Bytes(Cow::Borrowed(bytes)));
         let line = |recorder: &mut Recorder| recorder.open(&line);
-        self.told(line, |core, published| core.restore(published, bytes))
+        self.core()?
+            .told(Some(line), |core, published| core.restore(published, bytes))
     }
 }
 

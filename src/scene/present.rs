@@ -94,7 +94,9 @@ impl Scene {
             let begun = lock_read(&self.shared.published).frame_state.is_some();
             match begun {
                 true => Ok(()),
-                false => self.with(|core, published| core.start_frame_states(published)),
+                false => self
+                    .core()?
+                    .call(|core, published| core.start_frame_states(published)),
             }
         })?;
         let driven = FrameInput {

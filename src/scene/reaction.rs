@@ -37,7 +37,7 @@ impl Scene {
 
     /// [`Scene::contact_force`] into memory that need not be initialised; a failed call leaves it as it is.
     pub(crate) fn contact_force_to(&self, out: Output<'_, f32>) -> Result<()> {
-        self.with(|core, published| {
+        self.core()?.call(|core, published| {
             let want = 3 * core.maker.states.contact.len();
             if out.len() != want {
                 return Err(Error::Argument(format!(

@@ -66,7 +66,8 @@ impl Scene {
 
     /// [`Scene::decode`] into memory that need not be initialised; `None`: all nodes.
     pub(crate) fn decode_to(&self, nodes: Option<&[u32]>, out: Output<'_, f32>) -> Result<()> {
-        self.with(|core, published| core.decode(published, nodes, out))
+        self.core()?
+            .call(|core, published| core.decode(published, nodes, out))
     }
 
     /// Whether an output for the region or the points has `len` floats.

@@ -36,29 +36,30 @@ impl Record {
         self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes a call of which a recording tells with what `line` begins there. Where there is no room for that, nothing is done.
-    pub(super) fn told<T>(
-        &self,
-        published: &RwLock<Published>,
-        line: impl FnOnce(&mut Recorder) -> Result<()>,
-        call: impl FnOnce() -> Result<T>,
-    ) -> Result<T> {
+    /// Begins the line of a call with what `line` writes; says whether [`Record::end`] is to follow the call.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]: then no line is begun, and the call must not be made.
+    pub(super) fn begin(&self, line: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<bool> {
         if !self.on.load(Ordering::Acquire) {
-            return call();
+            return Ok(false);
         }
         let begun = self
             .lock()
             .as_mut()
             .map(|recorder| line(recorder).inspect_err(|_| recorder.drop_open()));
         begun.transpose()?;
-        let done = call();
+        Ok(true)
+    }
+
+    /// Ends the line of a call, or takes it back where the call has failed.
+    pub(super) fn end(&self, published: &RwLock<Published>, is_done: bool) {
         if let Some(recorder) = self.lock().as_mut() {
-            match done {
-                Ok(_) => recorder.close(|| digest(published)),
-                Err(_) => recorder.drop_open(),
+            match is_done {
+                true => recorder.close(|| digest(published)),
+                false => recorder.drop_open(),
             }
         }
-        done
     }
 
     /// Bytes of what no one has taken.

@@ -37,7 +37,7 @@ impl Scene {
     /// [`Error::State`] where a recording is on, where there is none to end, and where the last one has not been taken; [`Error::Unsupported`] for a scene
     /// whose steps depend on the clock, or that has a mesh of its own.
     pub fn record(&self, every: u32) -> Result<()> {
-        self.with(|core, published| {
+        self.core()?.call(|core, published| {
             let mut place = self.shared.record.lock();
             match (&mut *place, every) {
                 (Some(recorder), 0) if recorder.is_on() => {
@@ -89,18 +89,6 @@ impl Scene {
             recorder.forget();
         }
         Ok(made)
-    }
-
-    /// A call that changes what later steps compute, with its line in the recording.
-    pub(super) fn told<T>(
-        &self,
-        line: impl FnOnce(&mut Recorder) -> Result<()>,
-        call: impl FnOnce(&mut Core, &RwLock<Published>) -> Result<T>,
-    ) -> Result<T> {
-        self.with(|core, published| {
-            let record = &self.shared.record;
-            record.told(published, line, || call(core, published))
-        })
     }
 }
 

@@ -9,6 +9,7 @@ use super::core::Core;
 use super::published::Published;
 use super::record::{self, Record};
 use crate::error::{Error, Result};
+use crate::replay::Recorder;
 
 /// Core, published states, and whether a panic was caught.
 pub struct Shared {
@@ -38,25 +39,81 @@ impl Shared {
         self.poisoned.load(Ordering::Acquire)
     }
 
-    /// Calls with the core; a panic poisons the scene, whose state nobody can vouch for any more, and becomes an error.
-    pub fn guarded<T>(
-        &self,
-        mut core: MutexGuard<'_, Core>,
+    /// The core, for one call.
+    ///
+    /// # Errors
+    /// [`Error::Busy`] while another thread has it.
+    pub fn core(&self) -> Result<CoreGuard<'_>> {
+        Ok(CoreGuard {
+            core: lock(&self.core)?,
+            shared: self,
+        })
+    }
+
+    /// A step of the scene's worker, which waits for a call in progress.
+    pub fn step_blocking(&self, input: StepInput<'_>) -> Result<()> {
+        let core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
+        let guard = CoreGuard { core, shared: self };
+        let line = |recorder: &mut Recorder| record::step(recorder, &input);
+        guard.told(Some(line), |core, published| {
+            core.step(published, input, None)
+        })
+    }
+}
+
+/// A scene's core, which this thread has to itself for one call.
+pub struct CoreGuard<'a> {
+    core: MutexGuard<'a, Core>,
+    shared: &'a Shared,
+}
+
+impl CoreGuard<'_> {
+    /// Makes a call that changes nothing of what later steps compute, so that a recording has no line of it.
+    ///
+    /// # Errors
+    /// As [`CoreGuard::told`].
+    pub fn call<T>(
+        self,
         call: impl FnOnce(&mut Core, &RwLock<Published>) -> Result<T>,
     ) -> Result<T> {
-        if self.is_poisoned() {
+        self.told(None::<fn(&mut Recorder) -> Result<()>>, call)
+    }
+
+    /// Makes a call of which a recording tells with what `line` begins there. Where there is no room for that, nothing is done.
+    /// A panic poisons the scene, whose state nobody can vouch for any more, and becomes an error.
+    ///
+    /// # Errors
+    /// Those of the line and of the call; [`Error::Panic`] where the call panics, and from then on.
+    pub fn told<T>(
+        mut self,
+        line: Option<impl FnOnce(&mut Recorder) -> Result<()>>,
+        call: impl FnOnce(&mut Core, &RwLock<Published>) -> Result<T>,
+    ) -> Result<T> {
+        let shared = self.shared;
+        if shared.is_poisoned() {
             return Err(poison_error());
         }
-        match catch_unwind(AssertUnwindSafe(|| call(&mut core, &self.published))) {
+        let recorded = AssertUnwindSafe(|| {
+            let has_line = match line {
+                Some(line) => shared.record.begin(line)?,
+                None => false,
+            };
+            let done = call(&mut self.core, &shared.published);
+            if has_line {
+                shared.record.end(&shared.published, done.is_ok());
+            }
+            done
+        });
+        match catch_unwind(recorded) {
             Ok(result) => {
                 // A worker of the pool has panicked: its error came back as a result, and what it wrote is as doubtful.
                 if matches!(result, Err(Error::Panic(_))) {
-                    self.poisoned.store(true, Ordering::Release);
+                    shared.poisoned.store(true, Ordering::Release);
                 }
                 result
             }
             Err(payload) => {
-                self.poisoned.store(true, Ordering::Release);
+                shared.poisoned.store(true, Ordering::Release);
                 let message = payload
                     .downcast_ref::<String>()
                     .cloned()
@@ -65,24 +122,6 @@ impl Shared {
                 Err(Error::Panic(message))
             }
         }
-    }
-
-    /// The core, for [`Shared::guarded`].
-    ///
-    /// # Errors
-    /// [`Error::Busy`] while another thread has it.
-    pub fn core(&self) -> Result<MutexGuard<'_, Core>> {
-        lock(&self.core)
-    }
-
-    /// A step of the scene's worker, which waits for a call in progress.
-    pub fn step_blocking(&self, input: StepInput<'_>) -> Result<()> {
-        let core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
-        self.guarded(core, |core, published| {
-            let line = |recorder: &mut _| record::step(recorder, &input);
-            let call = || core.step(published, input, None);
-            self.record.told(published, line, call)
-        })
     }
 }
 

@@ -54,7 +54,7 @@ fn the_piece_in_which_a_point_lies_bears_its_force() {
     let edge = |z: f32| [-20.0, 20.0].map(|off| [x + 0.7, y + off, z]);
     let blade = [edge(z - 20.0), edge(z + 20.0)];
     scene.cut(0, 2, blade.as_flattened()).unwrap();
-    let looked_at = scene.with(|core, _| {
+    let looked_at = scene.core().unwrap().call(|core, _| {
         let body = &core.maker.body;
         let cut = &body.cut.as_ref().unwrap().body;
         let mut forces = NodeForces::new(&body.mesh, Some(cut))?;
