@@ -94,7 +94,7 @@ pub use options::{
 };
 pub use scene::{
     Bed, Blade, Contact, Cut, CutSurface, GroupMotion, Loads, MAX_POINT_FORCES, MAX_PRESSURES,
-    MAX_SUPPORTS, PointForce, Pressure, Progress, Scene, StepInput, SupportPose, SurfaceUpdate,
-    View,
+    MAX_SUPPORTS, PointForce, Pressure, Progress, Scene, SceneSurface, StepInput, SupportPose,
+    SurfaceUpdate, View,
 };
 pub use stats::{SceneStats, SceneTiming, flag};

@@ -44,7 +44,7 @@ pub unsafe extern "C" fn upt_scene_update_surface(
 ) -> upt_status {
     call_scene("upt_scene_update_surface", scene, |scene| {
         let make = |struct_size| {
-            let update = scene.update_surface()?;
+            let update = scene.surface().update()?;
             Ok(upt_surface {
                 struct_size,
                 is_new: update.is_new.into(),
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn upt_scene_read_surface(
     changed_count: u64,
 ) -> upt_status {
     call_scene("upt_scene_read_surface", scene, |scene| {
-        scene.with_surface(|surface| {
+        scene.surface().read(|surface| {
             let faces = surface.triangles.len();
             check(
                 !rest.is_null(),
@@ -135,7 +135,8 @@ pub unsafe extern "C" fn upt_scene_read_surface_positions(
 ) -> upt_status {
     call_scene("upt_scene_read_surface_positions", scene, |scene| {
         // SAFETY: the host passes room for that many elements, as the header asks.
-        scene.surface_positions_to(unsafe { output(out, out_count, "out") }?)?;
+        let out = unsafe { output(out, out_count, "out") }?;
+        scene.surface().positions_to(out)?;
         Ok(UPT_OK)
     })
 }

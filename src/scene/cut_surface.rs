@@ -13,7 +13,11 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::output::Output;
 
-/// What [`Scene::update_surface`] has found.
+/// The closed surface of a scene's body, as a host follows it: [`Scene::surface`].
+#[derive(Clone, Copy)]
+pub struct SceneSurface<'a>(&'a Scene);
+
+/// What [`SceneSurface::update`] has found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SurfaceUpdate {
     /// All vertices and triangles are new: the first call, and the first one after the body before was put back.
@@ -28,7 +32,7 @@ pub struct SurfaceUpdate {
     pub changed: usize,
 }
 
-/// The surface as the last [`Scene::update_surface`] left it.
+/// The surface as the last [`SceneSurface::update`] left it.
 #[derive(Clone, Copy, Debug)]
 pub struct CutSurface<'a> {
     /// Where each vertex lies in the tissue at rest, mm, for textures. The first `K` are the mesh's nodes, also those that no triangle has.
@@ -42,6 +46,13 @@ pub struct CutSurface<'a> {
 }
 
 impl Scene {
+    /// The closed surface of the body, which cuts change.
+    pub fn surface(&self) -> SceneSurface<'_> {
+        SceneSurface(self)
+    }
+}
+
+impl SceneSurface<'_> {
     /// Brings the closed surface of the body up to date: the mesh's own where nothing has happened, the lips of cuts, and what removal has
     /// laid bare. What it finds is what has changed since the last call. Where the body has not changed since, it does nothing.
     ///
@@ -53,21 +64,22 @@ impl Scene {
     /// # use upt::{Model, ModelOptions, Scene, SceneOptions};
     /// # let model = Model::open(Path::new("onnx/liver-coarse"), &ModelOptions::default())?;
     /// # let scene = Scene::new(model.clone(), &SceneOptions::default())?;
-    /// let update = scene.update_surface()?;
+    /// let surface = scene.surface();
+    /// let update = surface.update()?;
     /// assert!(update.is_new && update.changed == update.triangles);
     /// let mut positions = vec![0.0; 3 * update.vertices];
-    /// scene.surface_positions(&mut positions)?;
-    /// let triangles = scene.with_surface(|surface| surface.triangles.to_vec())?;
-    /// assert_eq!(scene.update_surface()?.changed, 0);
+    /// surface.positions(&mut positions)?;
+    /// let triangles = surface.read(|own| own.triangles.to_vec())?;
+    /// assert_eq!(surface.update()?.changed, 0);
     /// # assert_eq!(triangles.len(), update.triangles);
     /// # upt::Result::Ok(())
     /// ```
     ///
     /// # Errors
     /// [`Error::Busy`], [`Error::OutOfMemory`].
-    pub fn update_surface(&self) -> Result<SurfaceUpdate> {
-        let mut held = lock(&self.tools.surface)?;
-        self.core()?.call(|core, published| {
+    pub fn update(&self) -> Result<SurfaceUpdate> {
+        let mut held = lock(&self.0.tools.surface)?;
+        self.0.core()?.call(|core, published| {
             let body = lock_read(published).body.number;
             let (first_vertex, is_new) = match &mut *held {
                 Some(own) if own.is_of(body) => {
@@ -94,12 +106,12 @@ impl Scene {
         })
     }
 
-    /// Reads the surface as the last [`Scene::update_surface`] left it.
+    /// Reads the surface as the last [`SceneSurface::update`] left it.
     ///
     /// # Errors
     /// [`Error::State`] before the first update, [`Error::Busy`] while another thread uses the surface.
-    pub fn with_surface<T>(&self, read: impl FnOnce(CutSurface<'_>) -> T) -> Result<T> {
-        let held = lock(&self.tools.surface)?;
+    pub fn read<T>(&self, read: impl FnOnce(CutSurface<'_>) -> T) -> Result<T> {
+        let held = lock(&self.0.tools.surface)?;
         let own = held.as_ref().ok_or_else(not_asked)?;
         Ok(read(CutSurface {
             rest: &own.rest,
@@ -114,15 +126,15 @@ impl Scene {
     /// # Errors
     /// [`Error::State`] where the surface is not that of the body as it is now: update it; [`Error::Argument`] for an output of another
     /// length, [`Error::Unsupported`] for a scene with a region, whose other nodes are not decoded, [`Error::Busy`].
-    pub fn surface_positions(&self, out: &mut [f32]) -> Result<()> {
-        self.surface_positions_to(out.into())
+    pub fn positions(&self, out: &mut [f32]) -> Result<()> {
+        self.positions_to(out.into())
     }
 
-    /// [`Scene::surface_positions`] into memory that need not be initialised.
-    pub(crate) fn surface_positions_to(&self, out: Output<'_, f32>) -> Result<()> {
-        let held = lock(&self.tools.surface)?;
+    /// [`SceneSurface::positions`] into memory that need not be initialised.
+    pub(crate) fn positions_to(&self, out: Output<'_, f32>) -> Result<()> {
+        let held = lock(&self.0.tools.surface)?;
         let own = held.as_ref().ok_or_else(not_asked)?;
-        let shown = lock_read(&self.shared.published);
+        let shown = lock_read(&self.0.shared.published);
         own.check(&shown, out.len())?;
         let moved = shown.last.field.as_chunks::<3>().0;
         let vertices = own.surface.vertices.iter().zip(&own.rest);
@@ -142,17 +154,17 @@ impl Scene {
     /// The vertices as points on nodes, for frames of `len` floats. No body changes while frames are held.
     ///
     /// # Errors
-    /// As [`Scene::surface_positions`].
-    pub(super) fn surface_points(&self, len: usize) -> Result<Arc<AttachedPoints>> {
-        let mut held = lock(&self.tools.surface)?;
+    /// As [`SceneSurface::positions`].
+    pub(super) fn points(&self, len: usize) -> Result<Arc<AttachedPoints>> {
+        let mut held = lock(&self.0.tools.surface)?;
         let own = held.as_mut().ok_or_else(not_asked)?;
-        own.check(&lock_read(&self.shared.published), len)?;
+        own.check(&lock_read(&self.0.shared.published), len)?;
         own.points()
     }
 
     /// Bytes of the surface that a host follows.
-    pub(super) fn surface_bytes(&self) -> usize {
-        let held = lock(&self.tools.surface);
+    pub(super) fn held_bytes(&self) -> usize {
+        let held = lock(&self.0.tools.surface);
         held.map_or(0, |held| held.as_ref().map_or(0, Followed::held_bytes))
     }
 }

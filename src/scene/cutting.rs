@@ -18,7 +18,7 @@ use crate::replay::lines::{self, Line};
 /// What an operation did to the body.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cut {
-    /// The body is another one: its surface wants to be updated ([`Scene::update_surface`]) before it is read. Ask this, not the area: an edge that goes along a
+    /// The body is another one: its surface wants to be updated ([`SceneSurface::update`](super::SceneSurface::update)) before it is read. Ask this, not the area: an edge that goes along a
     /// face opens nothing and fixes on which side of it tissue lies.
     pub is_changed: bool,
     /// New area of a cut, mm².

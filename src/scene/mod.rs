@@ -73,7 +73,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 pub use bed::Bed;
-pub use cut_surface::{CutSurface, SurfaceUpdate};
+pub use cut_surface::{CutSurface, SceneSurface, SurfaceUpdate};
 pub use cutting::{Blade, Cut};
 pub use load_limits::{LARGEST_FORCE, LARGEST_PRESSURE};
 pub use loads::{Loads, MAX_PRESSURES, Pressure};

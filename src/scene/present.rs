@@ -77,7 +77,7 @@ impl Scene {
         let attached = match view {
             View::Region => None,
             View::Points => Some(Arc::clone(&lock_read(&self.shared.published).attached)),
-            View::Surface => Some(self.surface_points(out.len())?),
+            View::Surface => Some(self.surface().points(out.len())?),
         };
         // While frames are held no body changes.
         let cut = lock_read(&self.shared.published).body.cut.clone();

@@ -77,8 +77,8 @@ pub enum View {
     Region,
     /// The attached points.
     Points,
-    /// The vertices of the body's surface as [`Scene::update_surface`](crate::Scene::update_surface) left it, each from its place at rest: in frames
-    /// between steps. Where they are in the last state [`Scene::surface_positions`](crate::Scene::surface_positions) tells.
+    /// The vertices of the body's surface as [`SceneSurface::update`](crate::SceneSurface::update) left it, each from its place at rest: in frames
+    /// between steps. Where they are in the last state [`SceneSurface::positions`](crate::SceneSurface::positions) tells.
     Surface,
 }
 

@@ -83,7 +83,7 @@ impl Scene {
         let mut stats = lock_read(&self.shared.published).stats;
         stats.poisoned = self.shared.is_poisoned();
         stats.memory_bytes += (self.presenter_bytes()
-            + self.surface_bytes()
+            + self.surface().held_bytes()
             + self.shared.record.held_bytes()) as u64;
         stats
     }

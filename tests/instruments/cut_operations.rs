@@ -148,7 +148,7 @@ fn a_thin_spatula_presses_a_lip_beside_the_other() {
     let ends = [[-26.93, 94.14, 51.73], [-26.80, 71.36, 59.32]].map(Vector::from);
     let edges = ends.map(|tip| [tip, tip + up].map(|point| point.to_array()));
     assert!(scene.cut(0, 2, edges.as_flattened()).unwrap().area_mm2 > 100.0);
-    scene.update_surface().unwrap();
+    scene.surface().update().unwrap();
     let shape = Shape::Spatula {
         half_extents: [5.0, 8.0, 0.7],
         radius: 0.5,
@@ -160,13 +160,13 @@ fn a_thin_spatula_presses_a_lip_beside_the_other() {
         let mut tool = Tool::new(&shape, place.to_array(), rotation).unwrap();
         tool.friction = 0.4;
         step(&scene, &[tool]);
-        let (rest, seen) = (scene.with_surface(|surface| {
+        let (rest, seen) = (scene.surface().read(|surface| {
             let corners = surface.triangles.as_flattened().to_vec();
             (surface.rest.to_vec(), corners)
         }))
         .unwrap();
         let mut at = vec![0.0; 3 * rest.len()];
-        scene.surface_positions(&mut at).unwrap();
+        scene.surface().positions(&mut at).unwrap();
         // Of the tissue: nodes of an element that a blade went through lie outside of it.
         let moved = seen.iter().map(|vertex| {
             let own = Vector::from_slice(&at[3 * *vertex as usize..][..3]);
@@ -190,14 +190,14 @@ fn a_thin_spatula_presses_a_lip_beside_the_other() {
 
 /// How often the surface as it is goes around a point: 1 in the tissue, 0 outside (Van Oosterom and Strackee 1983).
 fn winding(scene: &Scene, point: Vector) -> f32 {
-    scene.update_surface().unwrap();
-    let (count, triangles) = (scene.with_surface(|surface| {
+    scene.surface().update().unwrap();
+    let (count, triangles) = (scene.surface().read(|surface| {
         let count = surface.rest.as_flattened().len();
         (count, surface.triangles.to_vec())
     }))
     .unwrap();
     let mut at = vec![0.0; count];
-    scene.surface_positions(&mut at).unwrap();
+    scene.surface().positions(&mut at).unwrap();
     let angles = triangles.iter().map(|corners| {
         let [a, b, c] = corners.map(|v| Vector::from_slice(&at[3 * v as usize..]) - point);
         let [x, y, z] = [a, b, c].map(Vector::length);

@@ -146,11 +146,11 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         assert_eq!(follow(scene).0.changed_count, 0);
 
         // In Rust the same.
-        own.update_surface().unwrap();
+        own.surface().update().unwrap();
         own.cut(0, 2, &edge).unwrap();
-        let same = own.update_surface().unwrap();
+        let same = own.surface().update().unwrap();
         assert_eq!(same.first_vertex as u64, update.first_vertex);
-        let in_rust = own.with_surface(|surface| Kept {
+        let in_rust = own.surface().read(|surface| Kept {
             rest: surface.rest.as_flattened().to_vec(),
             triangles: surface.triangles.to_vec(),
             inside: surface
@@ -174,7 +174,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
         let status = upt_scene_read_surface_positions(scene, at.as_mut_ptr(), floats);
         assert_eq!(status, UPT_OK, "{}", fixture::host::message());
         let mut in_rust = vec![0.0; at.len()];
-        own.surface_positions(&mut in_rust).unwrap();
+        own.surface().positions(&mut in_rust).unwrap();
         assert_eq!(bits(&at), bits(&in_rust));
         assert_frames_start_from_the_state(&own, &tool, &now.rest, &at);
         for (k, position) in at[..whole.rest.len()].iter().enumerate() {
@@ -211,9 +211,9 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
     let stale = own.present(Contact::None, 0.0, View::Surface, &mut at);
     assert!(matches!(stale, Err(Error::State(_))), "{stale:?}");
     own.set_region(Some(&[1])).unwrap();
-    let update = own.update_surface().unwrap();
+    let update = own.surface().update().unwrap();
     let mut at = vec![0.0; 3 * update.vertices];
-    let refused = own.surface_positions(&mut at);
+    let refused = own.surface().positions(&mut at);
     assert!(matches!(refused, Err(Error::Unsupported(_))), "{refused:?}");
 }
 
@@ -222,7 +222,7 @@ fn the_surface_of_a_cut_body_is_the_same_in_c_is_closed_and_follows_the_steps() 
 #[test]
 fn a_cut_says_whether_the_body_is_another_one() {
     let scene = Scene::new(liver(), &options()).unwrap();
-    scene.update_surface().unwrap();
+    scene.surface().update().unwrap();
     let [a, b, c, d] = slit(&scene, 6.0, 15.0);
     let blade = Blade {
         energy: 10.0,
@@ -240,15 +240,15 @@ fn a_cut_says_whether_the_body_is_another_one() {
         let poses = [edge(at), edge(at + 1)];
         let cut = scene.cut_with(&blade, 0, 2, poses.as_flattened()).unwrap();
         if cut.is_changed {
-            scene.update_surface().unwrap();
+            scene.surface().update().unwrap();
         } else {
             assert_eq!(cut, upt::Cut::default());
             idle += 1;
         }
         area += cut.area_mm2;
-        let floats = scene.with_surface(|surface| 3 * surface.rest.len());
+        let floats = scene.surface().read(|surface| 3 * surface.rest.len());
         let mut places = vec![0.0; floats.unwrap()];
-        scene.surface_positions(&mut places).unwrap();
+        scene.surface().positions(&mut places).unwrap();
     }
     assert!(area > 100.0 && idle > 20, "{area} mm2, {idle}");
 }
