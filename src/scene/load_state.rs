@@ -79,7 +79,7 @@ impl LoadState {
             last: Acting::zeros(mesh)?,
             next: Acting::zeros(mesh)?,
             pressure: Pressure {
-                faces: numbers().and(memory::room(most, WHAT))?,
+                faces: memory::room(most, WHAT)?,
                 pascal: [numbers()?, numbers()?],
                 pressed,
                 marked: memory::filled(count, false, WHAT)?,
