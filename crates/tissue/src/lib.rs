@@ -18,8 +18,10 @@ pub mod material {
 }
 
 pub mod axisymmetric;
+mod band;
 pub mod baselines;
 pub mod contact;
+pub mod cube;
 pub mod dataset;
 pub mod export;
 pub mod hang;

@@ -5,7 +5,7 @@ pub mod curve;
 pub mod data;
 mod growing;
 mod hold;
-mod least_squares;
+pub mod least_squares;
 pub mod plot;
 mod pressed;
 pub mod specimen;

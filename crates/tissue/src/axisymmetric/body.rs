@@ -1,7 +1,7 @@
 //! Forces of the triangles and their tangent.
 
-use super::band::Band;
 use super::section::Section;
+use crate::band::Band;
 use elements::{Deformation, Moduli, stress, tangent};
 use std::f64::consts::PI;
 

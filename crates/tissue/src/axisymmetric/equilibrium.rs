@@ -1,9 +1,9 @@
 //! The states of a body on the way of its supports, loads and obstacle, by Newton's method.
 
-use super::band::Band;
 use super::body::Body;
 use super::obstacle::Obstacle;
 use super::section::Section;
+use crate::band::Band;
 use crate::material::Material;
 
 /// Newton's steps of one part of the way.

@@ -6,7 +6,6 @@
 //! on their tangent, from one part of the way to the next, halved where it does not converge. Contact is without friction, by a penalty that is integrated
 //! over the surface. Lengths are mm, moduli Pa, forces within this module µN and beyond it mN.
 
-mod band;
 mod body;
 mod equilibrium;
 mod obstacle;

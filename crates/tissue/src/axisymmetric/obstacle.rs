@@ -1,6 +1,6 @@
 //! A rigid body without friction that the surface of the tissue meets.
 
-use super::band::Band;
+use crate::band::Band;
 use std::f64::consts::PI;
 
 /// What of it the tissue meets.

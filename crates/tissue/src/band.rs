@@ -1,7 +1,7 @@
 //! Symmetric matrices whose entries lie near the diagonal, and their factors `L D L^T`.
 
 /// The lower half, row by row: `width` entries before the diagonal, and the diagonal.
-pub(super) struct Band {
+pub(crate) struct Band {
     width: usize,
     rows: Vec<f64>,
 }
