@@ -36,6 +36,12 @@ impl FromStr for Asked {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if text.contains("fibres:") || text.ends_with("fibres") {
+            return Err(format!(
+                "law `{text}`: fibres are not fitted, since a row does not say how they lay; fit the matrix to a test across them, find K1 and K2 from one \
+                 along them, and give both to the other commands as --law MATRIX+fibres:K1/MU,K2"
+            ));
+        }
         match text.split_once(':') {
             None if text == "neo-hookean" => Ok(Self::Stretches(Wanted::NeoHookean)),
             None if text == "mooney-rivlin" => Ok(Self::Stretches(Wanted::MooneyRivlin)),
@@ -128,6 +134,27 @@ impl Wanted {
             }),
             Self::Ogden(_) => Law::Ogden(*terms),
             Self::NeoHookean => Law::default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Asked;
+
+    /// What is no law that is fitted says what to do.
+    #[test]
+    fn fibres_and_unknown_laws_are_refused_with_what_helps() {
+        for (text, words) in [
+            ("fibres:1,2", "fibres are not fitted"),
+            ("ogden:1+fibres:1,2", "--law MATRIX+fibres:K1/MU,K2"),
+            ("ogden+fibres", "fit the matrix to a test across them"),
+            ("gent", "use ogden:TERMS"),
+            ("ogden:x", "`x` is not a number of terms"),
+            ("yeoh:7", "`7` is not a number of constants"),
+        ] {
+            let error = text.parse::<Asked>().unwrap_err();
+            assert!(error.contains(words), "{error}");
         }
     }
 }

@@ -20,15 +20,15 @@ const LEVELS: usize = 6;
 /// Cells along half of a side, and how much smaller those of the second are.
 const CELLS: [usize; 2] = [2, 3];
 /// Fits after the first one.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 3;
 /// Exponents that are sought; beyond, a law's cap leaves little of its curve.
 const EXPONENTS: [f64; 2] = [-60.0, -2.0];
 const START: f64 = -25.0;
 /// Poisson's ratios that are sought.
 const POISSONS: [f64; 2] = [0.30, 0.49];
 const MIDDLE: f64 = 0.40;
-/// How much more a curve weighs whose error is all of the largest one's.
-const WEIGHING: f64 = 0.5;
+/// The logarithm of how much more the curve weighs that is fitted worst, where another is met wholly.
+const WEIGHING: f64 = 0.8;
 
 /// One term of Ogden's, and Poisson's ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
