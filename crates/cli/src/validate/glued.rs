@@ -28,7 +28,7 @@ const START: f64 = -25.0;
 const POISSONS: [f64; 2] = [0.30, 0.49];
 const MIDDLE: f64 = 0.40;
 /// The logarithm of how much more the curve weighs that is fitted worst, where another is met wholly.
-const WEIGHING: f64 = 0.8;
+const WEIGHING: f64 = 0.5;
 
 /// One term of Ogden's, and Poisson's ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +56,8 @@ struct Solved {
     finer: Rows,
     /// Of each curve.
     weights: Vec<f64>,
+    /// That of all rounds whose worst curve is fitted best, and R² of that curve.
+    best: Option<(f64, Tissue)>,
     rounds: usize,
 }
 
@@ -132,6 +134,7 @@ impl<'a> Cubes<'a> {
             rows: Vec::new(),
             finer: vec![[1.0; LEVELS]; curves.len()],
             weights: vec![1.0; curves.len()],
+            best: None,
             rounds: 0,
         };
         Self {
@@ -212,15 +215,18 @@ impl Test<Tissue> for Cubes<'_> {
     }
 
     fn refine(&self, found: &Tissue) -> Result<bool> {
-        if self.solved.borrow().rounds == ROUNDS {
-            return Ok(false);
-        }
         let limits = self.limits(*found)?;
         let coarse = self.coarse(*found).context("no equilibrium")?;
         let scores = self.scores(&limits, *found);
         let (worst, best) =
             (scores.iter()).fold((1.0f64, -1e9f64), |(a, b), s| (a.min(*s), b.max(*s)));
         let mut solved = self.solved.borrow_mut();
+        if solved.best.is_none_or(|(least, _)| worst > least) {
+            solved.best = Some((worst, *found));
+        }
+        if solved.rounds == ROUNDS {
+            return Ok(false);
+        }
         solved.rounds += 1;
         for (finer, (limits, coarse)) in solved.finer.iter_mut().zip(limits.iter().zip(&coarse)) {
             for (finer, (limit, coarse)) in finer.iter_mut().zip(limits.iter().zip(coarse)) {
@@ -241,7 +247,7 @@ pub struct Fit {
     pub shapes: Vec<f64>,
 }
 
-/// The best law; Poisson's ratio is sought where none is given.
+/// The law whose worst curve is fitted best; Poisson's ratio is sought where none is given.
 pub fn fit(curves: &[Curve], poisson: Option<f64>) -> Result<Fit> {
     let cubes = Cubes::new(curves);
     let unit = cubes.unit();
@@ -258,8 +264,8 @@ pub fn fit(curves: &[Curve], poisson: Option<f64>) -> Result<Fit> {
         alpha: constants[1],
         poisson: constants[2],
     };
-    let constants = least_squares::best(&cubes, vec![start], |constants| Some(tissue(constants)))?;
-    let tissue = tissue(&constants);
+    least_squares::best(&cubes, vec![start], |constants| Some(tissue(constants)))?;
+    let (_, tissue) = cubes.solved.borrow().best.context("no law fits")?;
     let rows = cubes.limits(tissue)?;
     let law = tissue.law(SHEAR_PA).context("no law fits")?;
     let shapes = curves.iter().zip(&rows).map(|(curve, row)| {
