@@ -51,7 +51,8 @@ const MEASURED: [Measured; 4] = [
     ("between plates", "silicone.csv", between_plates::section),
 ];
 /// Those without data.
-const OWN: [(&str, fn() -> Result<Section>); 4] = [
+type Own = (&'static str, fn() -> Result<Section>);
+const OWN: [Own; 4] = [
     ("relaxation", relaxing_rod::section),
     ("relaxation by steps", relaxing_shear::section),
     ("closed forms", closed_forms::section),
