@@ -271,7 +271,7 @@ pub fn fit(curves: &[Curve], poisson: f64) -> Result<Fit> {
 
 #[cfg(test)]
 mod tests {
-    use super::{LEVELS, SHEAR_PA, Tissue, between, fit, most, rows};
+    use super::{LEVELS, SHEAR_PA, Tissue, between, fit, rows};
     use crate::fit::curve::{Curve, Mode};
 
     /// Curves of a law's own cubes give its constants back.
@@ -298,9 +298,7 @@ mod tests {
         let rows = rows(&curves, tissue, 2).unwrap();
         let curves: Vec<Curve> = (curves.into_iter().zip(rows))
             .map(|(mut curve, row)| {
-                let most = most(&curve);
                 for (k, point) in curve.points.iter_mut().enumerate() {
-                    assert!((most * k as f64 / 9.0).abs() <= most.abs());
                     point[1] = tissue.shear_pa / SHEAR_PA * between(&row, k as f64 / 9.0);
                 }
                 curve
