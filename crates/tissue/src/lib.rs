@@ -34,6 +34,7 @@ pub mod mesh;
 pub mod mesh_import;
 pub mod mesh_quality;
 pub mod metrics;
+mod newton;
 pub mod programmes;
 pub mod regular_file;
 pub mod schemes;

@@ -33,7 +33,7 @@ struct Pushed {
     at: usize,
     /// Away from the tool.
     normal: Vector,
-    /// How fast it leaves the tool but for the modes, mm/s.
+    /// How fast it leaves the tool but for the modes, mm/s; at most zero.
     base: f32,
 }
 
@@ -76,10 +76,11 @@ impl Leaving {
         let before = self.before.filter(came).unwrap_or(*pose);
         let then = before.transform_point(pose.inverse_transform_point(point));
         let away = carried - (point - then) / step_s as f32;
+        // A tool that draws back is followed by the tissue about it, of which the modes are a small part: they are held as by one that stands.
         self.samples.push(Pushed {
             at,
             normal,
-            base: away.dot(normal),
+            base: away.dot(normal).min(0.0),
         });
     }
 
@@ -160,7 +161,13 @@ mod tests {
         let mut velocity = [40.0, 7.0];
         held(&mut velocity, Pose::from_translation(Vector::Y * 1.8));
         assert_eq!(velocity, [40.0, 7.0]);
-        // So does one that leaves slowly.
+        // One that has gone up does not pull the modes after it: it holds as one that stands.
+        let mut after = [40.0, 7.0];
+        held(&mut after, Pose::IDENTITY);
+        let mut stands = [40.0, 7.0];
+        held(&mut stands, still);
+        assert_eq!(after, stands);
+        // What leaves slowly stays as it is.
         let mut velocity = [6.0, 7.0];
         held(&mut velocity, still);
         assert_eq!(velocity, [6.0, 7.0]);

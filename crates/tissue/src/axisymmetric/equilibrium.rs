@@ -5,17 +5,12 @@ use super::obstacle::Obstacle;
 use super::section::Section;
 use crate::band::Band;
 use crate::material::Material;
+use crate::newton::{self, Balance};
 
-/// Newton's steps of one part of the way.
-const MOST_STEPS: usize = 60;
 /// What remains of the forces, relative to those of supports, loads and obstacle.
 const BALANCE: f64 = 1e-8;
-/// Or the last step, relative to the largest displacement: where cells grow over orders of size, forces end at their rounding.
-const STILL: f64 = 1e-6;
 /// The least part of what is asked for that is tried.
 const LEAST_PART: f64 = 1e-3;
-/// The least part of a step.
-const LEAST_STEP: f64 = 1e-3;
 
 /// No state was found further on.
 #[derive(Debug, thiserror::Error)]
@@ -134,7 +129,8 @@ impl Equilibrium {
                 true => self.way + part,
                 false => to,
             };
-            if let Some(u) = self.settle(next) {
+            let (from, u) = (self.way, self.u.clone());
+            if let Some(u) = newton::settle(self, u, from, next) {
                 (self.u, part) = (u, 2.0 * (next - self.way));
                 self.way = next;
                 continue;
@@ -149,6 +145,10 @@ impl Equilibrium {
         }
         Ok(())
     }
+}
+
+impl Balance for Equilibrium {
+    const MOST_STEPS: usize = 60;
 
     /// Forces, and if that is asked for the tangent, of a state at a part of the way; false where it is none.
     fn evaluate(&mut self, way: f64, u: &[f64], with_tangent: bool) -> bool {
@@ -172,13 +172,6 @@ impl Equilibrium {
         true
     }
 
-    /// The sum of `force` times a step over the free unknowns.
-    fn slope(&self, step: &[f64]) -> f64 {
-        let rows = self.force.iter().zip(step).zip(&self.held);
-        let free = rows.filter(|(_, held)| held.is_none());
-        free.map(|((force, step), _)| force * step).sum()
-    }
-
     /// What is left of the forces at free unknowns is small beside those that act.
     fn is_balanced(&self, way: f64) -> bool {
         let (mut left, mut acting) = (0.0, self.push * self.push);
@@ -192,52 +185,15 @@ impl Equilibrium {
         left <= BALANCE * BALANCE * acting
     }
 
-    /// The state at a part of the way, from the present one.
-    fn settle(&mut self, way: f64) -> Option<Vec<f64>> {
-        let mut u = self.u.clone();
-        for taken in 0..MOST_STEPS {
-            if !self.evaluate(way, &u, true) {
-                return None;
-            }
-            // The first step takes the supports along.
-            let moves = taken == 0;
-            if !moves && self.is_balanced(way) {
-                return Some(u);
-            }
-            let mut step: Vec<f64> = self.force.iter().map(|f| -f).collect();
-            for (at, held) in self.held.iter().enumerate() {
-                if let Some(motion) = held {
-                    let by = if moves {
-                        motion * (way - self.way)
-                    } else {
-                        0.0
-                    };
-                    self.band.fix(at, by, &mut step);
-                }
-            }
-            if !self.band.factor() {
-                return None;
-            }
-            self.band.solve(&mut step);
-            let slope = self.slope(&step);
-            let mut part = 1.0;
-            let largest = |list: &[f64]| list.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-            let is_last = !moves && largest(&step) <= STILL * largest(&u);
-            u = loop {
-                let next: Vec<f64> = u.iter().zip(&step).map(|(u, s)| u + part * s).collect();
-                let is_sound = self.evaluate(way, &next, false);
-                if is_sound && is_last {
-                    return Some(next);
-                }
-                if is_sound && (moves || self.slope(&step) <= 0.9 * slope.abs()) {
-                    break next;
-                }
-                part *= 0.5;
-                if moves || part < LEAST_STEP {
-                    return None;
-                }
-            };
-        }
-        None
+    fn forces(&self) -> &[f64] {
+        &self.force
+    }
+
+    fn held(&self) -> &[Option<f64>] {
+        &self.held
+    }
+
+    fn band(&mut self) -> &mut Band {
+        &mut self.band
     }
 }

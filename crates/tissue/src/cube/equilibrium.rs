@@ -3,14 +3,11 @@
 use super::brick::{Point, points};
 use super::grid::Grid;
 use crate::band::Band;
+use crate::newton::{self, Balance};
 use elements::{Deformation, Moduli, stress, tangent};
 
-/// Newton's steps to a strain.
-const MOST_STEPS: usize = 40;
 /// What remains of the forces, relative to those that hold.
 const BALANCE: f64 = 1e-7;
-/// The least part of a step.
-const LEAST_STEP: f64 = 1e-3;
 /// Least `det F` of a state.
 const LEAST_DET: f64 = 0.02;
 
@@ -54,8 +51,22 @@ impl<'a> Equilibrium<'a> {
         self.force[unknown]
     }
 
+    /// On to a strain; false where no equilibrium was found, and the state is then of no use.
+    pub fn settle(&mut self, strain: f64) -> bool {
+        let (from, u) = (self.strain, self.u.clone());
+        let Some(u) = newton::settle(self, u, from, strain) else {
+            return false;
+        };
+        (self.u, self.strain) = (u, strain);
+        true
+    }
+}
+
+impl Balance for Equilibrium<'_> {
+    const MOST_STEPS: usize = 40;
+
     /// Forces, and if that is asked for their derivatives; false where a brick folds.
-    fn evaluate(&mut self, u: &[f64], with_tangent: bool) -> bool {
+    fn evaluate(&mut self, _strain: f64, u: &[f64], with_tangent: bool) -> bool {
         self.force.fill(0.0);
         self.band.clear();
         for (nodes, points) in &self.bricks {
@@ -89,14 +100,7 @@ impl<'a> Equilibrium<'a> {
         true
     }
 
-    /// The sum of forces times a step over the free unknowns.
-    fn slope(&self, step: &[f64]) -> f64 {
-        let rows = self.force.iter().zip(step).zip(&self.held);
-        let free = rows.filter(|(_, held)| held.is_none());
-        free.map(|((force, step), _)| force * step).sum()
-    }
-
-    fn is_balanced(&self) -> bool {
+    fn is_balanced(&self, _strain: f64) -> bool {
         let (mut left, mut acting) = (0.0, 0.0);
         for (force, held) in self.force.iter().zip(&self.held) {
             match held {
@@ -107,49 +111,16 @@ impl<'a> Equilibrium<'a> {
         left <= BALANCE * BALANCE * acting
     }
 
-    /// On to a strain; false where no equilibrium was found, and the state is then of no use.
-    pub fn settle(&mut self, strain: f64) -> bool {
-        let mut u = self.u.clone();
-        for taken in 0..MOST_STEPS {
-            if !self.evaluate(&u, true) {
-                return false;
-            }
-            // The first step takes the plates along.
-            let moves = taken == 0;
-            if !moves && self.is_balanced() {
-                (self.u, self.strain) = (u, strain);
-                return true;
-            }
-            let mut step: Vec<f64> = self.force.iter().map(|f| -f).collect();
-            for (at, held) in self.held.iter().enumerate() {
-                if let Some(motion) = held {
-                    let by = if moves {
-                        motion * (strain - self.strain)
-                    } else {
-                        0.0
-                    };
-                    self.band.fix(at, by, &mut step);
-                }
-            }
-            if !self.band.factor() {
-                return false;
-            }
-            self.band.solve(&mut step);
-            let slope = self.slope(&step);
-            let mut part = 1.0;
-            u = loop {
-                let next: Vec<f64> = u.iter().zip(&step).map(|(u, s)| u + part * s).collect();
-                let is_sound = self.evaluate(&next, false);
-                if is_sound && (moves || self.slope(&step) <= 0.9 * slope.abs()) {
-                    break next;
-                }
-                part *= 0.5;
-                if moves || part < LEAST_STEP {
-                    return false;
-                }
-            };
-        }
-        false
+    fn forces(&self) -> &[f64] {
+        &self.force
+    }
+
+    fn held(&self) -> &[Option<f64>] {
+        &self.held
+    }
+
+    fn band(&mut self) -> &mut Band {
+        &mut self.band
     }
 }
 
